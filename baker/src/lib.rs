@@ -1,0 +1,7 @@
+//! Bakes scenes into Cubist bundles: one straight line from a scene file to bytes.
+//!
+//! ```text
+//! scene file -> Scene -> G-buffer -> charts, source image -> sheets -> fitted layers -> coded keys -> bytes
+//! ```
+pub mod camera;
+pub mod scene;

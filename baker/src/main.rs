@@ -1,0 +1,2 @@
+//! `cubist-bake`: scene in, bundle out.
+fn main() {}

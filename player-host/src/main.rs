@@ -1,0 +1,2 @@
+//! `cubist-player`: bundle in, window, pictures or figures out.
+fn main() {}

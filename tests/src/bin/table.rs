@@ -1,0 +1,2 @@
+//! Prints the project's tables.
+fn main() {}
