@@ -1,45 +1,248 @@
-//! A checked, borrowed view of a bundle's bytes.
+//! A checked, borrowed view of a bundle's bytes. Everything is checked once, here; afterwards every
+//! accessor is total.
+
 use crate::BundleError;
+use crate::atlas::Texture;
+use crate::format::{
+    self, ATLAS, Atlas, Envelope, FIXED, INFO, KEY_BYTES, KNOWN_FLAGS, KeyEntry, LABEL_BYTES, LABELS, LabelRecord, MAGIC, MASK, MASKED,
+    MAX_SECTIONS, MAX_SHEETS, PATH, Path, Section, TIME_LINEAR, VERSION,
+};
+use crate::grid::Grid;
+use crate::memory;
+use heapless::Vec;
 
-/// A parsed bundle.
+/// A parsed bundle: cheap to copy around by reference, borrowing everything from the bytes.
+#[derive(Clone, Debug)]
 pub struct Bundle<'a> {
-    bytes: &'a [u8],
-}
-
-/// One section of a bundle, as `inspect` lists it.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Section<'a> {
-    /// Four ASCII letters.
-    pub tag: [u8; 4],
-    /// A player that does not know a required section refuses the bundle.
-    pub required: bool,
-    /// The section's own postcard value.
-    pub bytes: &'a [u8],
+    sections: Vec<Section<'a>, MAX_SECTIONS>,
+    path: Path<'a>,
+    atlas: Atlas<'a>,
+    labels: &'a [[u8; LABEL_BYTES]],
+    mask: &'a [u8],
+    keys: &'a [[u8; KEY_BYTES]],
 }
 
 impl<'a> Bundle<'a> {
-    /// Checks `bytes` and borrows from them.
+    /// Checks `bytes` and borrows from them; time linear in their length, no memory.
+    ///
+    /// # Errors
+    /// [`BundleError`] names what is wrong: not a bundle, damaged, of another version, or with a
+    /// field out of range.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, BundleError> {
-        Ok(Self { bytes })
+        let (envelope, rest) = postcard::take_from_bytes::<Envelope<'a>>(bytes).map_err(|_| {
+            if bytes.starts_with(&MAGIC) { BundleError::Truncated { length: bytes.len() } } else { BundleError::NotABundle }
+        })?;
+        if envelope.magic != MAGIC {
+            return Err(BundleError::NotABundle);
+        }
+        if envelope.version != VERSION {
+            return Err(BundleError::Version { expected: VERSION, found: envelope.version });
+        }
+        let (stored, trailing) = rest.split_first_chunk::<4>().ok_or(BundleError::Truncated { length: bytes.len() })?;
+        if !trailing.is_empty() {
+            return Err(BundleError::TrailingBytes { count: trailing.len() });
+        }
+        let expected = u32::from_le_bytes(*stored);
+        let found = checksum(bytes.get(..bytes.len().saturating_sub(rest.len())).unwrap_or(&[]));
+        if expected != found {
+            return Err(BundleError::Checksum { expected, found });
+        }
+        Self::from_sections(envelope.sections)
     }
-    /// Width and height in pixels.
+
+    fn from_sections(sections: Vec<Section<'a>, MAX_SECTIONS>) -> Result<Self, BundleError> {
+        const KNOWN: [[u8; 4]; 5] = [PATH, ATLAS, LABELS, MASK, INFO];
+        for section in &sections {
+            if section.required && !KNOWN.contains(&section.tag) {
+                return Err(BundleError::UnknownSection { tag: section.tag });
+            }
+        }
+        let find = |tag: [u8; 4]| sections.iter().find(|s| s.tag == tag).map(|s| s.bytes).ok_or(BundleError::Section { tag });
+        let path = whole::<Path<'a>>(find(PATH)?).ok_or(BundleError::Section { tag: PATH })?;
+        let atlas = whole::<Atlas<'a>>(find(ATLAS)?).ok_or(BundleError::Section { tag: ATLAS })?;
+        let (labels, rest) = find(LABELS)?.as_chunks::<LABEL_BYTES>();
+        if !rest.is_empty() || labels.is_empty() || labels.len() > 256 {
+            return Err(BundleError::Section { tag: LABELS });
+        }
+        check_atlas(&atlas)?;
+        let mask = check_labels(labels, &atlas, find(MASK).unwrap_or(&[]))?;
+        let keys = check_path(&path)?;
+        Ok(Self { sections, path, atlas, labels, mask, keys })
+    }
+
+    /// Width and height of the screen, pixels.
+    #[must_use]
     pub fn size(&self) -> (u32, u32) {
-        (320, 240)
+        (u32::from(self.path.width), u32::from(self.path.height))
     }
-    /// Number of frames.
+
+    /// Number of frames, at least 1.
+    #[must_use]
     pub fn frames(&self) -> u32 {
-        self.bytes.len() as u32
+        self.path.frames
     }
-    /// Frames per second the bundle was baked for.
+
+    /// Frames per second that the bundle was baked for.
+    #[must_use]
     pub fn fps(&self) -> u16 {
-        30
+        self.path.fps
     }
-    /// Whether the frame after the last is the first.
+
+    /// Whether frame 0 follows the last frame.
+    #[must_use]
     pub fn looping(&self) -> bool {
-        false
+        self.path.looping
     }
-    /// Bytes of working memory a player of this bundle asks for.
+
+    /// Bytes of working memory that a player of this bundle asks for.
+    #[must_use]
     pub fn memory_needed(&self) -> usize {
-        0
+        memory::needed(self)
     }
+
+    /// The bounds on memory and work that the bundle states.
+    #[must_use]
+    pub fn limits(&self) -> format::Limits {
+        self.path.limits
+    }
+
+    /// The sections as they stand in the bytes, unknown ones included.
+    pub fn sections(&self) -> impl Iterator<Item = Section<'a>> + '_ {
+        self.sections.iter().copied()
+    }
+
+    /// The camera path's header and coded keys.
+    #[must_use]
+    pub fn path(&self) -> &Path<'a> {
+        &self.path
+    }
+
+    /// The source image as it is stored.
+    #[must_use]
+    pub fn atlas(&self) -> &Atlas<'a> {
+        &self.atlas
+    }
+
+    /// Number of labels, 1..=256.
+    #[must_use]
+    pub fn label_count(&self) -> usize {
+        self.labels.len()
+    }
+
+    /// The record of `label`; a label that is not there has an empty rectangle.
+    #[must_use]
+    pub fn label(&self, label: u8) -> LabelRecord {
+        self.labels.get(usize::from(label)).map_or_else(LabelRecord::default, LabelRecord::from_bytes)
+    }
+
+    /// Number of keys, at least 1.
+    #[must_use]
+    pub fn key_count(&self) -> usize {
+        self.keys.len()
+    }
+
+    /// Entry `key` of the key table; past the end, the last.
+    #[must_use]
+    pub fn key(&self, key: usize) -> KeyEntry {
+        let entry = self.keys.get(key).or(self.keys.last());
+        entry.map_or(KeyEntry { frame: 0, independent: true, end: 0 }, KeyEntry::from_bytes)
+    }
+
+    /// The coded record of `key`; empty past the end.
+    #[must_use]
+    pub fn record(&self, key: usize) -> &'a [u8] {
+        let start = key.checked_sub(1).map_or(0, |before| self.key(before).end as usize);
+        self.path.records.get(start..self.key(key).end as usize).unwrap_or(&[])
+    }
+
+    pub(crate) fn grid(&self) -> Grid {
+        Grid::new(self.path.width, self.path.height, self.path.cell_log2)
+    }
+
+    pub(crate) fn texture(&self) -> Texture<'a> {
+        Texture {
+            texels: self.atlas.texels,
+            mask: self.mask,
+            width_log2: u32::from(self.atlas.width_log2),
+            height: u32::from(self.atlas.height),
+        }
+    }
+}
+
+/// The CRC-32 (ISO-HDLC) of `bytes`, as it stands at a bundle's end.
+#[must_use]
+pub fn checksum(bytes: &[u8]) -> u32 {
+    const CRC: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+    CRC.checksum(bytes)
+}
+
+/// The postcard value that fills all of `bytes`.
+fn whole<'a, T: serde::Deserialize<'a>>(bytes: &'a [u8]) -> Option<T> {
+    postcard::take_from_bytes(bytes).ok().filter(|(_, rest)| rest.is_empty()).map(|(value, _)| value)
+}
+
+fn field(good: bool, name: &'static str, found: u32) -> Result<(), BundleError> {
+    if good { Ok(()) } else { Err(BundleError::Field { name, found }) }
+}
+
+fn length(expected: usize, found: usize, name: &'static str) -> Result<(), BundleError> {
+    if expected == found { Ok(()) } else { Err(BundleError::Length { name, expected, found }) }
+}
+
+fn check_atlas(atlas: &Atlas<'_>) -> Result<(), BundleError> {
+    field((4..=10).contains(&atlas.width_log2), "ATLS width_log2", u32::from(atlas.width_log2))?;
+    field((1..=1024).contains(&atlas.height), "ATLS height", u32::from(atlas.height))?;
+    field(atlas.encoding == 0, "ATLS encoding", u32::from(atlas.encoding))?;
+    length(usize::from(atlas.height) << atlas.width_log2, atlas.texels.len(), "ATLS texels")?;
+    let entries = atlas.palette.len() / 2;
+    field((1..=256).contains(&entries) && atlas.palette.len().is_multiple_of(2), "ATLS palette bytes", atlas.palette.len() as u32)
+}
+
+fn check_labels<'a>(labels: &[[u8; LABEL_BYTES]], atlas: &Atlas<'_>, mask: &'a [u8]) -> Result<&'a [u8], BundleError> {
+    let mut masked = false;
+    for bytes in labels {
+        let label = LabelRecord::from_bytes(bytes);
+        field(label.flags & !KNOWN_FLAGS == 0, "LABL flags", u32::from(label.flags))?;
+        field(label.left <= label.right && u32::from(label.right) <= 1 << atlas.width_log2, "LABL right", u32::from(label.right))?;
+        field(label.top <= label.bottom && label.bottom <= atlas.height, "LABL bottom", u32::from(label.bottom))?;
+        masked |= label.flags & MASKED != 0;
+        field(label.flags & (MASKED | FIXED) != MASKED | FIXED, "LABL flags", u32::from(label.flags))?;
+    }
+    if !masked {
+        return Ok(&[]);
+    }
+    length((usize::from(atlas.height) << atlas.width_log2) / 8, mask.len(), "MASK")?;
+    Ok(mask)
+}
+
+fn check_path<'a>(path: &Path<'a>) -> Result<&'a [[u8; KEY_BYTES]], BundleError> {
+    field((1..=4096).contains(&path.width), "PATH width", u32::from(path.width))?;
+    field((1..=4096).contains(&path.height), "PATH height", u32::from(path.height))?;
+    field((1..1 << 24).contains(&path.frames), "PATH frames", path.frames)?;
+    field(path.fps > 0, "PATH fps", u32::from(path.fps))?;
+    field((2..=5).contains(&path.cell_log2), "PATH cell_log2", u32::from(path.cell_log2))?;
+    field(path.time <= TIME_LINEAR, "PATH time", u32::from(path.time))?;
+    field(path.step_log2 <= 4, "PATH step_log2", u32::from(path.step_log2))?;
+    field((1..=MAX_SHEETS as u8).contains(&path.limits.cell_sheets), "PATH cell_sheets", u32::from(path.limits.cell_sheets))?;
+    let (keys, rest) = path.table.as_chunks::<KEY_BYTES>();
+    if !rest.is_empty() || keys.is_empty() {
+        return Err(BundleError::Section { tag: PATH });
+    }
+    let (mut frame, mut end, mut run) = (0, 0, 0u32);
+    for (index, bytes) in (0u32..).zip(keys) {
+        let key = KeyEntry::from_bytes(bytes);
+        let ordered = if index == 0 { key.frame == 0 && key.independent } else { key.frame > frame };
+        if !ordered || key.frame >= path.frames || key.end < end || key.end as usize > path.records.len() {
+            return Err(BundleError::Key { key: index });
+        }
+        (frame, end) = (key.frame, key.end);
+        run = if key.independent { 1 } else { run.saturating_add(1) };
+        // A seek decodes from an independent key up to the key after the frame.
+        field(run < u32::from(path.limits.seek_keys), "PATH seek_keys", u32::from(path.limits.seek_keys))?;
+    }
+    if !path.looping && frame != path.frames.saturating_sub(1) {
+        return Err(BundleError::Key { key: keys.len() as u32 });
+    }
+    length(end as usize, path.records.len(), "PATH records")?;
+    Ok(keys)
 }

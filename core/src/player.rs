@@ -1,14 +1,23 @@
-//! The player: new, seek, row, draw.
+//! The player: new, seek, row. Keys are decoded into the caller's memory by `seek`, pixels are made by `row`.
+
+use crate::coder::{Decoder, Probability};
+use crate::coverage::Chart;
+use crate::format::Limits;
+use crate::key::{self, Nothing, Setting};
+use crate::lists::{self, Sheets};
+use crate::memory::{self, KEYS, Workspace};
+use crate::span::Paint;
+use crate::timeline::Moment;
 use crate::{Bundle, MemoryError};
 
 /// A frame number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub struct Frame(pub u32);
 
 /// The order of the two bytes of a pixel in memory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum ByteOrder {
-    /// The number as the machine writes it.
+    /// As the machine writes a number.
     #[default]
     Native,
     /// Most significant byte first, as most SPI panels want it.
@@ -20,9 +29,9 @@ pub enum ByteOrder {
 /// Work done since the last `seek`, for figures and overlays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Work {
-    /// Keys decoded by the last seek.
+    /// Keys that the seek decoded.
     pub keys: u32,
-    /// Node layers interpolated in time.
+    /// Layers interpolated in time.
     pub layers: u32,
     /// Pixels drawn in smooth cells.
     pub smooth_pixels: u32,
@@ -32,42 +41,220 @@ pub struct Work {
     pub coverage_tests: u32,
 }
 
-/// Plays one bundle from memory the caller owns.
+/// Plays one bundle from memory that the caller owns.
+#[derive(Debug)]
 pub struct Player<'a> {
     bundle: &'a Bundle<'a>,
-    _memory: &'a mut [u8],
+    space: Workspace<'a>,
+    frame: Frame,
+    moment: Moment,
+    /// The last key decoded: its place on the timeline, and how many before it no independent key separates from it.
+    last: Option<(usize, u32)>,
+    /// The row of cells that `space.rows` and `space.sheets` hold.
+    loaded: Option<usize>,
+    work: Work,
 }
 
 impl<'a> Player<'a> {
-    /// A player over `memory`, which must hold [`Bundle::memory_needed`] bytes.
+    /// A player over `memory`, at frame 0.
+    ///
+    /// # Errors
+    /// [`MemoryError::TooSmall`] where `memory` has fewer bytes than [`Bundle::memory_needed`].
     pub fn new(bundle: &'a Bundle<'a>, memory: &'a mut [u8]) -> Result<Self, MemoryError> {
-        Ok(Self { bundle, _memory: memory })
+        let (needed, given) = (bundle.memory_needed(), memory.len());
+        let too_small = MemoryError::TooSmall { needed, given };
+        if given < needed {
+            return Err(too_small);
+        }
+        let space = memory::workspace(bundle, memory).ok_or(too_small)?;
+        let moment = Moment { interval: 0, weight: 0 };
+        let mut player = Self { bundle, space, frame: Frame(0), moment, last: None, loaded: None, work: Work::default() };
+        player.set_byte_order(ByteOrder::Native);
+        player.seek(Frame(0));
+        Ok(player)
     }
+
     /// The bundle that plays.
+    #[must_use]
     pub fn bundle(&self) -> &'a Bundle<'a> {
         self.bundle
     }
+
     /// Pixels come in this byte order from now on.
-    pub fn set_byte_order(&mut self, _order: ByteOrder) {}
-    /// Makes `frame` the current frame; past the end it wraps on a looping bundle, else shows the last.
-    pub fn seek(&mut self, _frame: Frame) {}
+    pub fn set_byte_order(&mut self, order: ByteOrder) {
+        let (colours, _) = self.bundle.atlas().palette.as_chunks::<2>();
+        for (entry, bytes) in self.space.palette.iter_mut().zip(colours) {
+            let colour = u16::from_le_bytes(*bytes);
+            *entry = match order {
+                ByteOrder::Native => colour,
+                ByteOrder::BigEndian => colour.to_be(),
+                ByteOrder::LittleEndian => colour.to_le(),
+            };
+        }
+    }
+
+    /// Makes `frame` the current frame; past the end it wraps on a looping bundle, else the last frame stays.
+    ///
+    /// Decodes at most [`Limits::seek_keys`] keys; none while the frame stays between the same two keys, one when it
+    /// moves on to the next.
+    pub fn seek(&mut self, frame: Frame) {
+        let frames = self.bundle.frames();
+        let frame = if self.bundle.looping() { frame.0.checked_rem(frames).unwrap_or(0) } else { frame.0.min(frames.saturating_sub(1)) };
+        self.work = Work::default();
+        self.loaded = None;
+        self.frame = Frame(frame);
+        self.moment = self.bundle.moment(frame);
+        let from = self.moment.interval;
+        // A path of one key has nothing to move on to.
+        let to = if self.bundle.key_count() == 1 && !self.bundle.looping() { from } else { from.saturating_add(1) };
+        let start = (0..=from).rev().find(|&key| self.bundle.key(key).independent).unwrap_or(0);
+        let next = match self.last {
+            Some((last, _)) if last == to => return,
+            Some((last, _)) if (start..to).contains(&last) => last.saturating_add(1),
+            _ => start,
+        };
+        for position in next..=to {
+            self.decode(position);
+        }
+    }
+
     /// The current frame.
+    #[must_use]
     pub fn frame(&self) -> Frame {
-        Frame(0)
+        self.frame
     }
-    /// Renders row `y` of the current frame as RGB565 into `out`; at most `out.len()` and the bundle's width pixels.
-    pub fn row(&mut self, _y: u32, _out: &mut [u16]) {}
+
     /// Work done since the last `seek`.
+    #[must_use]
     pub fn work(&self) -> Work {
-        Work::default()
+        self.work
     }
-    /// The current frame as an embedded-graphics `ImageDrawable`.
-    pub fn image(&mut self) -> FrameImage<'_, 'a> {
-        FrameImage { _player: self }
+
+    /// The bounds on work that the bundle states.
+    #[must_use]
+    pub fn limits(&self) -> Limits {
+        self.bundle.limits()
+    }
+
+    /// Renders row `y` of the current frame as RGB565 into `out`: as many pixels as both `out` and the
+    /// screen have; nothing below the screen.
+    ///
+    /// At most one texel read and one coverage test a pixel and sheet of its cell; never allocates, never waits.
+    /// The first row of a row of cells also interpolates the layers of two rows of nodes.
+    pub fn row(&mut self, y: u32, out: &mut [u16]) {
+        let (width, height) = self.bundle.size();
+        if y >= height {
+            return;
+        }
+        let grid = self.bundle.grid();
+        let row = (y >> grid.log2) as usize;
+        if self.loaded != Some(row) {
+            self.load(row);
+        }
+        let step = y & (1u32 << grid.log2).wrapping_sub(1);
+        let Ok(palette) = <&[u16; 256]>::try_from(&*self.space.palette) else { return };
+        let paint = Paint { texture: self.bundle.texture(), palette };
+        let [top, bottom] = &self.space.rows;
+        let drawn = out.len().min(width as usize);
+        let out = out.get_mut(..drawn).unwrap_or(&mut []);
+        for (column, pixels) in out.chunks_mut(1 << grid.log2).enumerate() {
+            let Some((back, front)) = self.space.sheets.cell(column).split_last() else {
+                // Only a broken bundle has a cell without sheets.
+                pixels.fill(0);
+                continue;
+            };
+            let count = pixels.len() as u32;
+            paint.all(pixels, back.span(top, bottom, step, grid.log2));
+            // Back to front: the frontmost sheet that covers a pixel has the last word.
+            for sheet in front.iter().rev() {
+                let chart = Chart::new(&self.bundle.label(sheet.label()));
+                paint.covered(pixels, sheet.span(top, bottom, step, grid.log2), &chart);
+                self.work.coverage_tests = self.work.coverage_tests.wrapping_add(count);
+            }
+            let kind = if front.is_empty() { &mut self.work.smooth_pixels } else { &mut self.work.torn_pixels };
+            *kind = kind.wrapping_add(count);
+        }
+    }
+
+    /// Interpolates the nodes around a row of cells and looks up its sheets.
+    fn load(&mut self, row: usize) {
+        let grid = self.bundle.grid();
+        let texture = self.bundle.texture();
+        let Workspace { keys, lists, rows, sheets, .. } = &mut self.space;
+        let from = self.moment.interval;
+        let to = if self.bundle.key_count() == 1 && !self.bundle.looping() { from } else { from.wrapping_add(1) };
+        let (Some(a), Some(b), Some(lists)) = (keys.get(from % KEYS), keys.get(to % KEYS), lists.get(from % KEYS)) else { return };
+        let mut fill = |nodes: &mut crate::cell::NodeRow<'_>, row: usize| {
+            let layers = nodes.fill(grid, row, [a, b], self.moment.weight, &texture);
+            self.work.layers = self.work.layers.wrapping_add(layers);
+        };
+        let [top, bottom] = rows;
+        // Going down, the nodes below the last row of cells are those above this one.
+        if row > 0 && self.loaded == Some(row.wrapping_sub(1)) {
+            core::mem::swap(top, bottom);
+        } else {
+            fill(top, row);
+        }
+        fill(bottom, row.wrapping_add(1));
+        sheets.fill(grid, row, lists, top, bottom);
+        self.loaded = Some(row);
+    }
+
+    /// Decodes the key at `position` of the timeline; position `key_count` of a looping path is key 0 again.
+    fn decode(&mut self, position: usize) {
+        let bundle = self.bundle;
+        let index = position.checked_rem(bundle.key_count()).unwrap_or(0);
+        let independent = bundle.key(index).independent;
+        let run = match self.last {
+            Some((last, run)) if !independent && last.wrapping_add(1) == position => run.saturating_add(1),
+            _ => 0,
+        };
+        let Workspace { list_contexts, key_contexts, traces, keys, lists, .. } = &mut self.space;
+        if independent {
+            list_contexts.fill(Probability::NEW);
+            key_contexts.fill(Probability::NEW);
+        }
+        let mut bits = Decoder::new(bundle.record(index));
+        let grid = bundle.grid();
+        let mut nothing = |_| Sheets::new();
+
+        let [before_that, before, now] = turned(keys, position);
+        let [_, lists_before, lists_after] = turned(lists, position);
+        let labels = bundle.label_count();
+        let has_after = index < bundle.intervals();
+        let has_before = index > 0 || bundle.looping();
+        if has_after {
+            let known = (!independent).then_some(&*lists_before);
+            lists::code(&mut bits, list_contexts, grid, labels, known, lists_after, &mut nothing);
+        }
+        if independent && has_before {
+            // Who starts here has not seen the interval before, which the key's layers depend on too.
+            let known = has_after.then_some(&*lists_after);
+            lists::code(&mut bits, list_contexts, grid, labels, known, lists_before, &mut nothing);
+        }
+        let length =
+            |from: usize| i32::try_from(bundle.key_frame(from.wrapping_add(1)).saturating_sub(bundle.key_frame(from))).unwrap_or(0);
+        let ratio = || key::interval_ratio(length(position.wrapping_sub(1)), length(position.wrapping_sub(2)));
+        let setting = Setting {
+            grid,
+            label: |label| bundle.label(label),
+            step_log2: u32::from(bundle.path().step_log2),
+            before: (run >= 1).then_some(&*before),
+            before_that: (run >= 2).then(|| (&*before_that, ratio())),
+            lists: [has_before.then_some(&*lists_before), has_after.then_some(&*lists_after)],
+        };
+        key::code(&mut bits, key_contexts, &setting, now, traces, &mut Nothing);
+        self.last = Some((position, run));
+        self.work.keys = self.work.keys.wrapping_add(1);
     }
 }
 
-/// The current frame as an embedded-graphics image.
-pub struct FrameImage<'p, 'a> {
-    _player: &'p mut Player<'a>,
+/// The three slots in order of age, the one for `position` last.
+fn turned<T>(slots: &mut [T; KEYS], position: usize) -> [&mut T; KEYS] {
+    let [a, b, c] = slots;
+    match position % KEYS {
+        0 => [b, c, a],
+        1 => [c, a, b],
+        _ => [a, b, c],
+    }
 }

@@ -1,0 +1,47 @@
+//! The source image at playback: texels by position, and whether a texel belongs to its chart.
+//! Borrowed from the bundle; read by `span`.
+
+use crate::fixed::{PLAY_BITS, PlayUv};
+
+/// The colour plane and the mask.
+#[derive(Clone, Copy, Debug)]
+pub struct Texture<'a> {
+    /// One palette index a texel, row by row.
+    pub texels: &'a [u8],
+    /// One bit a texel, least significant first; empty where no label is masked.
+    pub mask: &'a [u8],
+    /// A row is 2^this texels.
+    pub width_log2: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+impl Texture<'_> {
+    /// The index of the texel that holds `uv`; any index at all for a position outside.
+    #[must_use]
+    pub const fn index(&self, uv: PlayUv) -> usize {
+        ((uv.v >> PLAY_BITS << self.width_log2) | (uv.u >> PLAY_BITS)) as u32 as usize
+    }
+
+    /// The palette index at `uv`; 0 outside.
+    #[must_use]
+    pub fn texel(&self, uv: PlayUv) -> u8 {
+        self.texels.get(self.index(uv)).copied().unwrap_or(0)
+    }
+
+    /// Whether the texel at `uv` belongs to a chart.
+    #[must_use]
+    pub fn covered(&self, uv: PlayUv) -> bool {
+        let index = self.index(uv);
+        self.mask.get(index >> 3).is_some_and(|byte| byte >> (index & 7) & 1 == 1)
+    }
+
+    /// `uv` brought inside the picture, far enough from its edges (32 / 65536 texel) that the rounding of a span of 32
+    /// pixels between two such positions stays inside too.
+    #[must_use]
+    pub fn clamp(&self, uv: PlayUv) -> PlayUv {
+        const EDGE: i32 = 32;
+        let limit = |size: u32| (size.wrapping_shl(PLAY_BITS) as i32).wrapping_sub(EDGE).max(EDGE);
+        PlayUv { u: uv.u.clamp(EDGE, limit(1 << self.width_log2)), v: uv.v.clamp(EDGE, limit(self.height)) }
+    }
+}

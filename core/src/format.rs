@@ -1,0 +1,220 @@
+//! The bytes: the postcard values a bundle is made of, as the baker writes and `bundle` reads them.
+//! FORMAT.md says the same to the byte.
+
+use heapless::Vec;
+use serde::{Deserialize, Serialize};
+
+/// What a bundle starts with.
+pub const MAGIC: [u8; 6] = *b"CUBIST";
+/// The format's version.
+pub const VERSION: u16 = 1;
+/// The most sections a bundle can hold.
+pub const MAX_SECTIONS: usize = 16;
+/// The most sheets a cell can hold.
+pub const MAX_SHEETS: usize = 12;
+/// The most layers a node can hold: every label of the cells around it.
+pub const MAX_NODE_LAYERS: usize = 48;
+
+/// Tag of the section that holds the camera path: screen, timeline, keys. A [`Path`].
+pub const PATH: [u8; 4] = *b"PATH";
+/// Tag of the section that holds the source image. An [`Atlas`].
+pub const ATLAS: [u8; 4] = *b"ATLS";
+/// Tag of the section that holds one [`LabelRecord`] a label.
+pub const LABELS: [u8; 4] = *b"LABL";
+/// Tag of the section that holds one bit a texel: is it part of its chart? Present if a label is [`MASKED`].
+pub const MASK: [u8; 4] = *b"MASK";
+/// Tag of the optional section that holds a UTF-8 text about the scene, for people.
+pub const INFO: [u8; 4] = *b"INFO";
+
+/// The whole bundle; a CRC-32 (ISO-HDLC, little-endian) of all bytes before it follows.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Envelope<'a> {
+    /// [`MAGIC`].
+    pub magic: [u8; 6],
+    /// [`VERSION`].
+    pub version: u16,
+    /// The sections, in any order.
+    #[serde(borrow)]
+    pub sections: Vec<Section<'a>, MAX_SECTIONS>,
+}
+
+/// One section of a bundle.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Section<'a> {
+    /// Four ASCII letters.
+    pub tag: [u8; 4],
+    /// A player that does not know a required section refuses the bundle.
+    pub required: bool,
+    /// The section's own value.
+    pub bytes: &'a [u8],
+}
+
+/// The source image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Atlas<'a> {
+    /// The width is 2^this texels, 4..=10.
+    pub width_log2: u8,
+    /// Rows, 1..=1024.
+    pub height: u16,
+    /// 0: one palette index a texel.
+    pub encoding: u8,
+    /// RGB565, little-endian, at most 256 entries.
+    pub palette: &'a [u8],
+    /// Row by row, from the top.
+    pub texels: &'a [u8],
+}
+
+/// [`LabelRecord::flags`]: the chart does not fill its rectangle; the mask says where it is.
+pub const MASKED: u8 = 1;
+/// [`LabelRecord::flags`]: the layer is an affine function of the screen position, not coded in keys.
+pub const FIXED: u8 = 2;
+/// All flags this version knows.
+pub const KNOWN_FLAGS: u8 = MASKED | FIXED;
+/// Bytes of a label record.
+pub const LABEL_BYTES: usize = 20;
+
+/// One label: a chart's place in the source image, and what its surface asks for.
+/// Stored as [`LABEL_BYTES`] little-endian bytes in the order of the fields.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct LabelRecord {
+    /// Left edge of the rectangle, texels.
+    pub left: u16,
+    /// Top edge.
+    pub top: u16,
+    /// Right edge, exclusive.
+    pub right: u16,
+    /// Bottom edge, exclusive.
+    pub bottom: u16,
+    /// [`MASKED`], [`FIXED`].
+    pub flags: u8,
+    /// Room for a tint; 0: none.
+    pub tint: [u8; 3],
+    /// [`FIXED`] labels: u at the screen's left edge, 1/64 texel.
+    pub origin_u: u16,
+    /// [`FIXED`] labels: v at the screen's top edge, 1/64 texel.
+    pub origin_v: u16,
+    /// [`FIXED`] labels: u a pixel to the right, 1/16384 texel.
+    pub step_u: u16,
+    /// [`FIXED`] labels: v a pixel down, 1/16384 texel.
+    pub step_v: u16,
+}
+
+impl LabelRecord {
+    /// The record's bytes.
+    #[must_use]
+    pub const fn to_bytes(self) -> [u8; LABEL_BYTES] {
+        let [a, b] = self.left.to_le_bytes();
+        let [c, d] = self.top.to_le_bytes();
+        let [e, f] = self.right.to_le_bytes();
+        let [g, h] = self.bottom.to_le_bytes();
+        let [r, s, t] = self.tint;
+        let [i, j] = self.origin_u.to_le_bytes();
+        let [k, l] = self.origin_v.to_le_bytes();
+        let [m, n] = self.step_u.to_le_bytes();
+        let [o, p] = self.step_v.to_le_bytes();
+        [a, b, c, d, e, f, g, h, self.flags, r, s, t, i, j, k, l, m, n, o, p]
+    }
+
+    /// The record in `bytes`.
+    #[must_use]
+    pub const fn from_bytes(bytes: &[u8; LABEL_BYTES]) -> Self {
+        let [a, b, c, d, e, f, g, h, flags, r, s, t, i, j, k, l, m, n, o, p] = *bytes;
+        Self {
+            left: u16::from_le_bytes([a, b]),
+            top: u16::from_le_bytes([c, d]),
+            right: u16::from_le_bytes([e, f]),
+            bottom: u16::from_le_bytes([g, h]),
+            flags,
+            tint: [r, s, t],
+            origin_u: u16::from_le_bytes([i, j]),
+            origin_v: u16::from_le_bytes([k, l]),
+            step_u: u16::from_le_bytes([m, n]),
+            step_v: u16::from_le_bytes([o, p]),
+        }
+    }
+}
+
+/// How layers are interpolated between keys: [`Path::time`].
+pub const TIME_HOLD: u8 = 0;
+/// Straight lines between neighbouring keys.
+pub const TIME_LINEAR: u8 = 1;
+
+/// One camera path: the screen, the grid, the timeline and the coded keys.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Path<'a> {
+    /// Screen width, pixels, 1..=4096.
+    pub width: u16,
+    /// Screen height, pixels, 1..=4096.
+    pub height: u16,
+    /// Frames, at least 1.
+    pub frames: u32,
+    /// Frames per second.
+    pub fps: u16,
+    /// Frame 0 follows the last frame.
+    pub looping: bool,
+    /// A cell is 2^this pixels wide and high, 2..=5.
+    pub cell_log2: u8,
+    /// [`TIME_HOLD`] or [`TIME_LINEAR`].
+    pub time: u8,
+    /// Coordinates are coded in steps of 2^this / 64 texel, 0..=4.
+    pub step_log2: u8,
+    /// The bounds that memory and work follow from.
+    pub limits: Limits,
+    /// One [`KEY_BYTES`]-byte entry a key.
+    pub table: &'a [u8],
+    /// The key records, one after the other.
+    pub records: &'a [u8],
+}
+
+/// Upper bounds, stated by the baker, enforced by the player.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct Limits {
+    /// Layers in a key.
+    pub key_layers: u16,
+    /// Layers in a row of nodes of a key.
+    pub row_layers: u16,
+    /// Bytes of a key interval's sheet lists.
+    pub list_bytes: u16,
+    /// Sheets in a row of cells.
+    pub row_sheets: u16,
+    /// Sheets in a cell.
+    pub cell_sheets: u8,
+    /// Keys decoded by one seek.
+    pub seek_keys: u16,
+}
+
+/// Bytes of a key table entry.
+pub const KEY_BYTES: usize = 8;
+
+/// An entry of the key table: four bytes of frame number with the highest bit set on a key that needs no
+/// earlier one, four bytes of where its record ends in [`Path::records`]; both little-endian.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct KeyEntry {
+    /// The frame the key stands at.
+    pub frame: u32,
+    /// Decoding can start here.
+    pub independent: bool,
+    /// Where the record ends.
+    pub end: u32,
+}
+
+impl KeyEntry {
+    const INDEPENDENT: u32 = 1 << 31;
+
+    /// The entry's bytes.
+    #[must_use]
+    pub const fn to_bytes(self) -> [u8; KEY_BYTES] {
+        let word = if self.independent { self.frame | Self::INDEPENDENT } else { self.frame };
+        let [a, b, c, d] = word.to_le_bytes();
+        let [e, f, g, h] = self.end.to_le_bytes();
+        [a, b, c, d, e, f, g, h]
+    }
+
+    /// The entry in `bytes`.
+    #[must_use]
+    pub const fn from_bytes(bytes: &[u8; KEY_BYTES]) -> Self {
+        let [a, b, c, d, e, f, g, h] = *bytes;
+        let word = u32::from_le_bytes([a, b, c, d]);
+        Self { frame: word & !Self::INDEPENDENT, independent: word & Self::INDEPENDENT != 0, end: u32::from_le_bytes([e, f, g, h]) }
+    }
+}

@@ -1,0 +1,79 @@
+//! embedded-graphics: the current frame as an image.
+//!
+//! ```
+//! # use cubist_core::Player;
+//! # use embedded_graphics_core::{draw_target::DrawTarget, pixelcolor::Rgb565, image::ImageDrawable};
+//! fn show<D: DrawTarget<Color = Rgb565>>(player: &mut Player<'_>, row: &mut [u16], display: &mut D) -> Result<(), D::Error> {
+//!     player.image(row).draw(display)
+//! }
+//! ```
+
+use crate::{Bundle, Player};
+use core::cell::RefCell;
+use embedded_graphics_core::draw_target::DrawTarget;
+use embedded_graphics_core::geometry::{OriginDimensions, Point, Size};
+use embedded_graphics_core::image::ImageDrawable;
+use embedded_graphics_core::pixelcolor::Rgb565;
+use embedded_graphics_core::pixelcolor::raw::RawU16;
+use embedded_graphics_core::primitives::Rectangle;
+
+/// The current frame of a player, drawn row by row.
+#[derive(Debug)]
+pub struct FrameImage<'p, 'a> {
+    /// Drawing takes `&self` in embedded-graphics; the player's row state lives in its memory.
+    state: RefCell<(&'p mut Player<'a>, &'p mut [u16])>,
+    size: Size,
+}
+
+impl<'a> Player<'a> {
+    /// The current frame as an embedded-graphics image; `row` is a buffer of at least the screen's
+    /// width (pixels past a shorter one are not drawn). The player's byte order must be native.
+    pub fn image<'p>(&'p mut self, row: &'p mut [u16]) -> FrameImage<'p, 'a> {
+        let size = self.bundle().size_of_screen();
+        FrameImage { state: RefCell::new((self, row)), size }
+    }
+}
+
+impl Bundle<'_> {
+    fn size_of_screen(&self) -> Size {
+        let (width, height) = self.size();
+        Size::new(width, height)
+    }
+}
+
+impl OriginDimensions for Bundle<'_> {
+    fn size(&self) -> Size {
+        self.size_of_screen()
+    }
+}
+
+impl OriginDimensions for FrameImage<'_, '_> {
+    fn size(&self) -> Size {
+        self.size
+    }
+}
+
+impl ImageDrawable for FrameImage<'_, '_> {
+    type Color = Rgb565;
+
+    fn draw<D: DrawTarget<Color = Rgb565>>(&self, target: &mut D) -> Result<(), D::Error> {
+        self.draw_sub_image(target, &Rectangle::new(Point::zero(), self.size))
+    }
+
+    fn draw_sub_image<D: DrawTarget<Color = Rgb565>>(&self, target: &mut D, area: &Rectangle) -> Result<(), D::Error> {
+        // Held only while drawing, which nothing can enter twice.
+        let Ok(mut state) = self.state.try_borrow_mut() else { return Ok(()) };
+        let (player, buffer) = &mut *state;
+        let area = area.intersection(&Rectangle::new(Point::zero(), self.size));
+        let (left, top) = (area.top_left.x.max(0) as usize, area.top_left.y.max(0) as u32);
+        let drawn = buffer.len().min(self.size.width as usize);
+        let Some(row) = buffer.get_mut(..drawn) else { return Ok(()) };
+        for down in 0..area.size.height {
+            player.row(top.wrapping_add(down), row);
+            let colours = row.iter().skip(left).take(area.size.width as usize).map(|&raw| Rgb565::from(RawU16::new(raw)));
+            let line = Rectangle::new(Point::new(0, down as i32), Size::new(colours.len() as u32, 1));
+            target.fill_contiguous(&line, colours)?;
+        }
+        Ok(())
+    }
+}

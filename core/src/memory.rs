@@ -1,0 +1,89 @@
+//! Working memory: what a player of a bundle needs, and how the caller's bytes are cut up.
+//! One function says both, so that they cannot disagree.
+
+use crate::Bundle;
+use crate::cell::{Layer, NodeRow, RowSheets, Sheet};
+use crate::coder::Probability;
+use crate::key::{self, Key, Trace};
+use crate::lists::{self, Lists};
+use bytemuck::Pod;
+
+/// Keys held at a time: two to play between, one more that the next is told from.
+pub const KEYS: usize = 3;
+
+/// The caller's memory, cut up.
+#[derive(Debug)]
+pub struct Workspace<'m> {
+    /// The source image's palette in the display's byte order.
+    pub palette: &'m mut [u16],
+    /// What the lists are coded with.
+    pub list_contexts: &'m mut [Probability],
+    /// What the positions are coded with.
+    pub key_contexts: &'m mut [Probability],
+    /// What the positions of two rows of nodes left behind.
+    pub traces: &'m mut [Trace],
+    /// The keys.
+    pub keys: [Key<'m>; KEYS],
+    /// The sheet lists of as many intervals.
+    pub lists: [Lists<'m>; KEYS],
+    /// The nodes above and below the current row of cells.
+    pub rows: [NodeRow<'m>; 2],
+    /// The sheets of the current row of cells.
+    pub sheets: RowSheets<'m>,
+}
+
+/// Cuts slices off memory, or only counts what they would take.
+struct Cutter<'m> {
+    rest: &'m mut [u32],
+    words: usize,
+}
+
+impl<'m> Cutter<'m> {
+    fn take<T: Pod>(&mut self, count: usize) -> &'m mut [T] {
+        let words = count.saturating_mul(size_of::<T>()).div_ceil(4);
+        self.words = self.words.saturating_add(words);
+        let Some((head, rest)) = core::mem::take(&mut self.rest).split_at_mut_checked(words) else { return &mut [] };
+        self.rest = rest;
+        bytemuck::try_cast_slice_mut(head).unwrap_or(&mut []).get_mut(..count).unwrap_or(&mut [])
+    }
+}
+
+fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
+    let (grid, limits) = (bundle.grid(), bundle.limits());
+    let (key_layers, row_layers) = (usize::from(limits.key_layers), usize::from(limits.row_layers));
+    let one_more = |count: usize| count.saturating_add(1);
+    Workspace {
+        palette: cutter.take(256),
+        list_contexts: cutter.take(lists::CONTEXTS),
+        key_contexts: cutter.take(key::CONTEXTS),
+        traces: cutter.take(row_layers.saturating_mul(2)),
+        keys: core::array::from_fn(|_| Key {
+            start: cutter.take(one_more(grid.nodes())),
+            label: cutter.take(key_layers),
+            uv: cutter.take(key_layers),
+        }),
+        lists: core::array::from_fn(|_| Lists::new(cutter.take(one_more(grid.rows)), cutter.take(usize::from(limits.list_bytes)))),
+        rows: core::array::from_fn(|_| NodeRow {
+            start: cutter.take(one_more(grid.node_columns())),
+            label: cutter.take(row_layers),
+            layer: cutter.take::<Layer>(row_layers),
+        }),
+        sheets: RowSheets { start: cutter.take(one_more(grid.columns)), sheet: cutter.take::<Sheet>(usize::from(limits.row_sheets)) },
+    }
+}
+
+/// Bytes that a player of `bundle` needs, at any alignment.
+pub fn needed(bundle: &Bundle<'_>) -> usize {
+    let mut counter = Cutter { rest: &mut [], words: 0 };
+    let _ = cut(bundle, &mut counter);
+    counter.words.saturating_mul(4).saturating_add(3)
+}
+
+/// `memory` cut up for `bundle`; `None` where it is too small.
+pub fn workspace<'m>(bundle: &Bundle<'_>, memory: &'m mut [u8]) -> Option<Workspace<'m>> {
+    let (_, words, _) = bytemuck::pod_align_to_mut::<u8, u32>(memory);
+    let given = words.len();
+    let mut cutter = Cutter { rest: words, words: 0 };
+    let workspace = cut(bundle, &mut cutter);
+    (cutter.words <= given).then_some(workspace)
+}
