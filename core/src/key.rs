@@ -11,7 +11,7 @@ use crate::coder::{self, Bits, NUMBER_CONTEXTS, Probability};
 use crate::fixed::{KEY_BITS, KeyUv};
 use crate::format::{FIXED, LabelRecord, MAX_NODE_LAYERS};
 use crate::grid::Grid;
-use crate::lists::{Cursor, Lists};
+use crate::lists::{Cursor, Lists, Sheets};
 use heapless::Vec;
 
 /// Competing predictors.
@@ -77,8 +77,11 @@ pub struct Trace {
     unused: [u8; 2],
 }
 
-/// What an encoder knows; a decoder's [`Nothing`] answers zeros, which are ignored.
+/// What an encoder knows; a decoder's [`Nothing`] gives answers that are ignored.
 pub trait Source {
+    /// The sheets of `cell` in the interval that starts (`ahead`) or ends at the key.
+    fn sheets(&mut self, ahead: bool, cell: usize) -> Sheets;
+
     /// The residual to code, in steps along u and v, for the layer of `label` at `node` whose `predicted` position is in
     /// 1/64 texel. `contexts` tell what residuals cost.
     fn residual(&mut self, node: usize, label: u8, predicted: [i32; 2], contexts: [&[Probability]; 2]) -> [i32; 2];
@@ -89,6 +92,10 @@ pub trait Source {
 pub struct Nothing;
 
 impl Source for Nothing {
+    fn sheets(&mut self, _: bool, _: usize) -> Sheets {
+        Sheets::new()
+    }
+
     fn residual(&mut self, _: usize, _: u8, _: [i32; 2], _: [&[Probability]; 2]) -> [i32; 2] {
         [0, 0]
     }
@@ -397,10 +404,4 @@ impl Candidates {
         let correction = self.temporal.map_or([0, 0], |t| minus(actual, t)).map(|x| x.clamp(-32_768, 32_767) as i16);
         Trace { error, correction, noise: byte(size(residual)), temporal: u8::from(self.temporal.is_some()), unused: [0; 2] }
     }
-}
-
-/// The length of an interval over that of the one before, Q8, as the temporal extrapolation wants it.
-#[must_use]
-pub fn interval_ratio(length: i32, before: i32) -> i32 {
-    length.wrapping_shl(8).checked_div(before).unwrap_or(256).clamp(0, 1 << 12)
 }

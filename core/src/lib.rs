@@ -45,6 +45,7 @@ pub mod key;
 pub mod lists;
 mod memory;
 mod player;
+pub mod record;
 mod span;
 mod timeline;
 

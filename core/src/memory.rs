@@ -3,29 +3,18 @@
 
 use crate::Bundle;
 use crate::cell::{Layer, NodeRow, RowSheets, Sheet};
-use crate::coder::Probability;
-use crate::key::{self, Key, Trace};
+use crate::key::{self, Key};
 use crate::lists::{self, Lists};
+use crate::record::Stream;
 use bytemuck::Pod;
-
-/// Keys held at a time: two to play between, one more that the next is told from.
-pub const KEYS: usize = 3;
 
 /// The caller's memory, cut up.
 #[derive(Debug)]
 pub struct Workspace<'m> {
     /// The source image's palette in the display's byte order.
     pub palette: &'m mut [u16],
-    /// What the lists are coded with.
-    pub list_contexts: &'m mut [Probability],
-    /// What the positions are coded with.
-    pub key_contexts: &'m mut [Probability],
-    /// What the positions of two rows of nodes left behind.
-    pub traces: &'m mut [Trace],
-    /// The keys.
-    pub keys: [Key<'m>; KEYS],
-    /// The sheet lists of as many intervals.
-    pub lists: [Lists<'m>; KEYS],
+    /// The keys, and what they are decoded with.
+    pub stream: Stream<'m>,
     /// The nodes above and below the current row of cells.
     pub rows: [NodeRow<'m>; 2],
     /// The sheets of the current row of cells.
@@ -54,15 +43,17 @@ fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
     let one_more = |count: usize| count.saturating_add(1);
     Workspace {
         palette: cutter.take(256),
-        list_contexts: cutter.take(lists::CONTEXTS),
-        key_contexts: cutter.take(key::CONTEXTS),
-        traces: cutter.take(row_layers.saturating_mul(2)),
-        keys: core::array::from_fn(|_| Key {
-            start: cutter.take(one_more(grid.nodes())),
-            label: cutter.take(key_layers),
-            uv: cutter.take(key_layers),
-        }),
-        lists: core::array::from_fn(|_| Lists::new(cutter.take(one_more(grid.rows)), cutter.take(usize::from(limits.list_bytes)))),
+        stream: Stream {
+            list_contexts: cutter.take(lists::CONTEXTS),
+            key_contexts: cutter.take(key::CONTEXTS),
+            traces: cutter.take(row_layers.saturating_mul(2)),
+            keys: core::array::from_fn(|_| Key {
+                start: cutter.take(one_more(grid.nodes())),
+                label: cutter.take(key_layers),
+                uv: cutter.take(key_layers),
+            }),
+            lists: core::array::from_fn(|_| Lists::new(cutter.take(one_more(grid.rows)), cutter.take(usize::from(limits.list_bytes)))),
+        },
         rows: core::array::from_fn(|_| NodeRow {
             start: cutter.take(one_more(grid.node_columns())),
             label: cutter.take(row_layers),

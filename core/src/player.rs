@@ -1,11 +1,11 @@
 //! The player: new, seek, row. Keys are decoded into the caller's memory by `seek`, pixels are made by `row`.
 
-use crate::coder::{Decoder, Probability};
+use crate::coder::Decoder;
 use crate::coverage::Chart;
 use crate::format::Limits;
-use crate::key::{self, Nothing, Setting};
-use crate::lists::{self, Sheets};
-use crate::memory::{self, KEYS, Workspace};
+use crate::key::Nothing;
+use crate::memory::{self, Workspace};
+use crate::record::{KEYS, Shape};
 use crate::span::Paint;
 use crate::timeline::Moment;
 use crate::{Bundle, MemoryError};
@@ -180,10 +180,13 @@ impl<'a> Player<'a> {
     fn load(&mut self, row: usize) {
         let grid = self.bundle.grid();
         let texture = self.bundle.texture();
-        let Workspace { keys, lists, rows, sheets, .. } = &mut self.space;
+        let Workspace { stream, rows, sheets, .. } = &mut self.space;
         let from = self.moment.interval;
         let to = if self.bundle.key_count() == 1 && !self.bundle.looping() { from } else { from.wrapping_add(1) };
-        let (Some(a), Some(b), Some(lists)) = (keys.get(from % KEYS), keys.get(to % KEYS), lists.get(from % KEYS)) else { return };
+        let (Some(a), Some(b), Some(lists)) = (stream.keys.get(from % KEYS), stream.keys.get(to % KEYS), stream.lists.get(from % KEYS))
+        else {
+            return;
+        };
         let mut fill = |nodes: &mut crate::cell::NodeRow<'_>, row: usize| {
             let layers = nodes.fill(grid, row, [a, b], self.moment.weight, &texture);
             self.work.layers = self.work.layers.wrapping_add(layers);
@@ -204,57 +207,15 @@ impl<'a> Player<'a> {
     fn decode(&mut self, position: usize) {
         let bundle = self.bundle;
         let index = position.checked_rem(bundle.key_count()).unwrap_or(0);
-        let independent = bundle.key(index).independent;
-        let run = match self.last {
-            Some((last, run)) if !independent && last.wrapping_add(1) == position => run.saturating_add(1),
-            _ => 0,
-        };
-        let Workspace { list_contexts, key_contexts, traces, keys, lists, .. } = &mut self.space;
-        if independent {
-            list_contexts.fill(Probability::NEW);
-            key_contexts.fill(Probability::NEW);
-        }
-        let mut bits = Decoder::new(bundle.record(index));
-        let grid = bundle.grid();
-        let mut nothing = |_| Sheets::new();
-
-        let [before_that, before, now] = turned(keys, position);
-        let [_, lists_before, lists_after] = turned(lists, position);
-        let labels = bundle.label_count();
-        let has_after = index < bundle.intervals();
-        let has_before = index > 0 || bundle.looping();
-        if has_after {
-            let known = (!independent).then_some(&*lists_before);
-            lists::code(&mut bits, list_contexts, grid, labels, known, lists_after, &mut nothing);
-        }
-        if independent && has_before {
-            // Who starts here has not seen the interval before, which the key's layers depend on too.
-            let known = has_after.then_some(&*lists_after);
-            lists::code(&mut bits, list_contexts, grid, labels, known, lists_before, &mut nothing);
-        }
-        let length =
-            |from: usize| i32::try_from(bundle.key_frame(from.wrapping_add(1)).saturating_sub(bundle.key_frame(from))).unwrap_or(0);
-        let ratio = || key::interval_ratio(length(position.wrapping_sub(1)), length(position.wrapping_sub(2)));
-        let setting = Setting {
-            grid,
+        let place = bundle.place(position, self.last);
+        let shape = Shape {
+            grid: bundle.grid(),
+            labels: bundle.label_count(),
             label: |label| bundle.label(label),
             step_log2: u32::from(bundle.path().step_log2),
-            before: (run >= 1).then_some(&*before),
-            before_that: (run >= 2).then(|| (&*before_that, ratio())),
-            lists: [has_before.then_some(&*lists_before), has_after.then_some(&*lists_after)],
         };
-        key::code(&mut bits, key_contexts, &setting, now, traces, &mut Nothing);
-        self.last = Some((position, run));
+        self.space.stream.code(&mut Decoder::new(bundle.record(index)), shape, place, &mut Nothing);
+        self.last = Some((position, place.run));
         self.work.keys = self.work.keys.wrapping_add(1);
-    }
-}
-
-/// The three slots in order of age, the one for `position` last.
-fn turned<T>(slots: &mut [T; KEYS], position: usize) -> [&mut T; KEYS] {
-    let [a, b, c] = slots;
-    match position % KEYS {
-        0 => [b, c, a],
-        1 => [c, a, b],
-        _ => [a, b, c],
     }
 }

@@ -4,6 +4,7 @@
 use crate::Bundle;
 use crate::fixed::ONE;
 use crate::format::{KeyEntry, TIME_HOLD};
+use crate::record::Place;
 
 /// A moment between two keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,5 +41,28 @@ impl Bundle<'_> {
         let weight = (u64::from(passed).wrapping_mul(ONE as u64).wrapping_add(u64::from(length / 2))).checked_div(u64::from(length));
         let weight = if self.path().time == TIME_HOLD { 0 } else { weight.unwrap_or(0).min(ONE as u64) as i32 };
         Moment { interval, weight }
+    }
+
+    /// The place of the record at `position` of the timeline, given the position and run of the last one coded.
+    #[must_use]
+    pub fn place(&self, position: usize, last: Option<(usize, u32)>) -> Place {
+        let index = position.checked_rem(self.key_count()).unwrap_or(0);
+        let independent = self.key(index).independent;
+        let run = match last {
+            Some((last, run)) if !independent && last.wrapping_add(1) == position => run.saturating_add(1),
+            _ => 0,
+        };
+        let length = |back: usize| {
+            let from = position.saturating_sub(back);
+            self.key_frame(from.saturating_add(1)).saturating_sub(self.key_frame(from))
+        };
+        Place {
+            position,
+            independent,
+            run,
+            has_before: index > 0 || self.looping(),
+            has_after: index < self.intervals(),
+            lengths: [length(1), length(2)],
+        }
     }
 }
