@@ -26,7 +26,9 @@ impl Pose {
         let forward = (target - eye).try_normalize().unwrap_or(DVec3::NEG_Z);
         let right = [up, DVec3::NEG_Z, DVec3::X]
             .iter()
-            .find_map(|u| forward.cross(u.normalize_or_zero()).try_normalize().filter(|_| forward.cross(u.normalize_or_zero()).length() > 1e-6))
+            .find_map(|u| {
+                forward.cross(u.normalize_or_zero()).try_normalize().filter(|_| forward.cross(u.normalize_or_zero()).length() > 1e-6)
+            })
             .unwrap_or(DVec3::X);
         Self { eye, right, up: right.cross(forward), forward, fov }
     }

@@ -3,5 +3,11 @@
 //! ```text
 //! scene file -> Scene -> G-buffer -> charts, source image -> sheets -> fitted layers -> coded keys -> bytes
 //! ```
+pub mod atlas;
 pub mod camera;
+pub mod encode;
+pub mod fit;
+pub mod gbuffer;
+pub mod order;
 pub mod scene;
+pub mod sheets;

@@ -1,0 +1,272 @@
+//! Encoding: ordered sheets, fitted layers and the source image become the bytes of a bundle.
+//! The stream is described by `cubist_core::record`; this drives it and keeps the bounds it states.
+
+mod range;
+
+use crate::atlas::SourceImage;
+use crate::fit::Fit;
+use crate::gbuffer::GBuffer;
+use crate::sheets::{KeyGrid, Layers, Sheets};
+use cubist_core::coder::Probability;
+use cubist_core::fixed::KEY_BITS;
+use cubist_core::format::{
+    ATLAS, Atlas, Envelope, FIXED, INFO, KeyEntry, LABELS, LabelRecord, Limits, MAGIC, MASK, MASKED, PATH, Path, Section, TIME_LINEAR,
+    VERSION,
+};
+use cubist_core::key::{self, Key, Source, Trace};
+use cubist_core::lists::{self, Lists};
+use cubist_core::record::{KEYS, Place, Shape, Stream};
+use range::Encoder;
+
+/// How keys are coded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CodingSettings {
+    /// Coordinates are stored in steps of 2^this / 64 texel.
+    pub step_log2: u8,
+    /// What a bit is worth, in squared texels of error summed over pixels, when residuals of ghosts are
+    /// rounded towards zero; 0 keeps them all.
+    pub lambda: f32,
+    /// Every this many keys one that needs no earlier one; bounds what a seek decodes.
+    pub independent_every: usize,
+}
+
+/// What goes into a bundle besides the keys.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame<'a> {
+    /// Frames per second.
+    pub fps: u16,
+    /// A text for people.
+    pub info: &'a str,
+}
+
+/// Makes the bytes of a bundle.
+#[must_use]
+#[expect(clippy::too_many_arguments, reason = "the end of the line: everything comes together here")]
+pub fn bundle(
+    gbuffer: &GBuffer,
+    grid: &KeyGrid,
+    image: &SourceImage,
+    sheets: &Sheets,
+    layers: &Layers,
+    fit: &Fit,
+    settings: CodingSettings,
+    frame: Frame<'_>,
+) -> Vec<u8> {
+    let labels: Vec<LabelRecord> = image.labels.iter().map(label_record).collect();
+    let (table, records) = keys(gbuffer, grid, sheets, layers, fit, &labels, settings);
+    let path = Path {
+        width: gbuffer.width as u16,
+        height: gbuffer.height as u16,
+        frames: gbuffer.frames,
+        fps: frame.fps,
+        looping: grid.looping,
+        cell_log2: grid.grid.log2 as u8,
+        time: TIME_LINEAR,
+        step_log2: settings.step_log2,
+        limits: limits(grid, sheets, layers, settings),
+        table: &table,
+        records: &records,
+    };
+    let palette: Vec<u8> = image.palette.iter().flat_map(|&colour| rgb565(colour).to_le_bytes()).collect();
+    let atlas = Atlas {
+        width_log2: image.width.trailing_zeros() as u8,
+        height: image.height as u16,
+        encoding: 0,
+        palette: &palette,
+        texels: &image.texels,
+    };
+    let masked = image.labels.iter().any(|label| label.masked);
+    let mask: Vec<u8> = if masked { image.covered.chunks(8).map(bits).collect() } else { Vec::new() };
+    let label_bytes: Vec<u8> = labels.iter().flat_map(|label| label.to_bytes()).collect();
+    let (path, atlas) = (postcard_bytes(&path), postcard_bytes(&atlas));
+    let section = |tag, required, bytes| Section { tag, required, bytes };
+    let mut sections = vec![section(PATH, true, &path[..]), section(ATLAS, true, &atlas), section(LABELS, true, &label_bytes)];
+    if masked {
+        sections.push(section(MASK, true, &mask));
+    }
+    if !frame.info.is_empty() {
+        sections.push(section(INFO, false, frame.info.as_bytes()));
+    }
+    let mut envelope = Envelope { magic: MAGIC, version: VERSION, sections: Default::default() };
+    envelope.sections.extend(sections);
+    let mut bytes = postcard_bytes(&envelope);
+    bytes.extend(cubist_core::checksum(&bytes).to_le_bytes());
+    bytes
+}
+
+fn postcard_bytes<T: serde::Serialize>(value: &T) -> Vec<u8> {
+    postcard::to_stdvec(value).unwrap_or_else(|error| unreachable!("plain structs of numbers and slices always serialise: {error}"))
+}
+
+/// A colour in the display's 5, 6 and 5 bits.
+#[must_use]
+pub fn rgb565([r, g, b]: [u8; 3]) -> u16 {
+    u16::from(r >> 3) << 11 | u16::from(g >> 2) << 5 | u16::from(b >> 3)
+}
+
+/// Eight flags in a byte, the first in the lowest bit.
+fn bits(flags: &[bool]) -> u8 {
+    flags.iter().enumerate().fold(0, |byte, (at, &flag)| byte | u8::from(flag) << at)
+}
+
+fn label_record(label: &crate::atlas::Label) -> LabelRecord {
+    let [left, top, right, bottom] = label.rect;
+    let scaled = |value: f64, bits: u32| libm::round(value * f64::from(1u32 << bits)).clamp(0.0, 65_535.0) as u16;
+    let mut record = LabelRecord { left, top, right, bottom, flags: if label.masked { MASKED } else { 0 }, ..LabelRecord::default() };
+    if let Some(fixed) = &label.fixed {
+        record.flags = FIXED;
+        (record.origin_u, record.origin_v) = (scaled(fixed.origin[0], KEY_BITS), scaled(fixed.origin[1], KEY_BITS));
+        (record.step_u, record.step_v) = (scaled(fixed.step[0], 14), scaled(fixed.step[1], 14));
+    }
+    record
+}
+
+/// The bounds that the lists and layers keep.
+fn limits(grid: &KeyGrid, sheets: &Sheets, layers: &Layers, settings: CodingSettings) -> Limits {
+    let (cells, nodes) = (grid.grid.cells(), grid.grid.nodes());
+    let count = |from: usize, to: usize| (layers.start[to] - layers.start[from]) as usize;
+    let most = |values: &mut dyn Iterator<Item = usize>| u16::try_from(values.max().unwrap_or(0)).unwrap_or(u16::MAX);
+    let width = grid.grid.node_columns();
+    Limits {
+        key_layers: most(&mut (0..grid.keys.len()).map(|key| count(key * nodes, (key + 1) * nodes))),
+        row_layers: most(&mut (0..grid.keys.len() * grid.grid.node_rows()).map(|row| count(row * width, (row + 1) * width))),
+        list_bytes: most(&mut sheets.lists.chunks(cells).map(|lists| lists.iter().map(|list| 1 + list.len()).sum())),
+        row_sheets: most(&mut sheets.lists.chunks(grid.grid.columns).map(|lists| lists.iter().map(Vec::len).sum())),
+        cell_sheets: sheets.lists.iter().map(Vec::len).max().unwrap_or(1) as u8,
+        seek_keys: (settings.independent_every.max(1).min(grid.keys.len()) + 1) as u16,
+    }
+}
+
+/// The key table and the records.
+fn keys(
+    gbuffer: &GBuffer,
+    grid: &KeyGrid,
+    sheets: &Sheets,
+    layers: &Layers,
+    fit: &Fit,
+    labels: &[LabelRecord],
+    settings: CodingSettings,
+) -> (Vec<u8>, Vec<u8>) {
+    let bounds = limits(grid, sheets, layers, settings);
+    let mut memory = Memory::new(grid, bounds);
+    let mut stream = memory.stream();
+    let shape = Shape {
+        grid: grid.grid,
+        labels: labels.len(),
+        label: |label: u8| labels.get(usize::from(label)).copied().unwrap_or_default(),
+        step_log2: u32::from(settings.step_log2),
+    };
+    let length = |interval: usize| grid.keys.get(interval).map_or(0, |&start| grid.end(interval) - start);
+    let (mut table, mut records) = (Vec::new(), Vec::new());
+    for (position, &frame) in grid.keys.iter().enumerate() {
+        let run = position % settings.independent_every.max(1);
+        let place = Place {
+            position,
+            independent: run == 0,
+            run: run as u32,
+            has_before: position > 0 || grid.looping,
+            has_after: position < grid.intervals(),
+            lengths: [length(position.saturating_sub(1)), length(position.saturating_sub(2))],
+        };
+        let mut source = Wanted { gbuffer, grid, sheets, layers, fit, settings, key: position };
+        let mut encoder = Encoder::default();
+        stream.code(&mut encoder, shape, place, &mut source);
+        records.extend(encoder.finish());
+        table.extend(KeyEntry { frame, independent: place.independent, end: records.len() as u32 }.to_bytes());
+    }
+    (table, records)
+}
+
+/// The encoder's copy of the memory that the player decodes into.
+struct Memory {
+    contexts: [Vec<Probability>; 2],
+    traces: Vec<Trace>,
+    keys: [(Vec<u16>, Vec<u8>, Vec<u32>); KEYS],
+    lists: [(Vec<u16>, Vec<u8>); KEYS],
+}
+
+impl Memory {
+    fn new(grid: &KeyGrid, limits: Limits) -> Self {
+        let layers = usize::from(limits.key_layers);
+        Self {
+            contexts: [vec![Probability::NEW; lists::CONTEXTS], vec![Probability::NEW; key::CONTEXTS]],
+            traces: vec![Trace::default(); 2 * usize::from(limits.row_layers)],
+            keys: std::array::from_fn(|_| (vec![0; grid.grid.nodes() + 1], vec![0; layers], vec![0; layers])),
+            lists: std::array::from_fn(|_| (vec![0; grid.grid.rows + 1], vec![0; usize::from(limits.list_bytes)])),
+        }
+    }
+
+    fn stream(&mut self) -> Stream<'_> {
+        let [list_contexts, key_contexts] = &mut self.contexts;
+        Stream {
+            list_contexts,
+            key_contexts,
+            traces: &mut self.traces,
+            keys: self.keys.each_mut().map(|(start, label, uv)| Key { start, label, uv }),
+            lists: self.lists.each_mut().map(|(rows, data)| Lists::new(rows, data)),
+        }
+    }
+}
+
+/// What the encoder wants to say.
+struct Wanted<'a> {
+    gbuffer: &'a GBuffer,
+    grid: &'a KeyGrid,
+    sheets: &'a Sheets,
+    layers: &'a Layers,
+    fit: &'a Fit,
+    settings: CodingSettings,
+    key: usize,
+}
+
+impl Wanted<'_> {
+    /// Whether the node's own ray sees `label` at the key.
+    fn visible(&self, node: usize, label: u8) -> bool {
+        let size = 1usize << self.grid.grid.log2;
+        let width = self.grid.grid.node_columns();
+        let x = (node % width * size).min(self.grid.size[0] - 1);
+        let y = (node / width * size).min(self.grid.size[1] - 1);
+        let frame = self.grid.keys[self.key] as usize;
+        self.gbuffer.label[(frame * self.grid.size[1] + y) * self.grid.size[0] + x] == u16::from(label)
+    }
+}
+
+impl Source for Wanted<'_> {
+    fn sheets(&mut self, ahead: bool, cell: usize) -> lists::Sheets {
+        let intervals = self.grid.intervals();
+        let interval = if ahead { self.key } else { (self.key + intervals - 1) % intervals };
+        let list = &self.sheets.lists[interval * self.grid.grid.cells() + cell];
+        lists::Sheets::from_slice(list).unwrap_or_default()
+    }
+
+    fn residual(&mut self, node: usize, label: u8, predicted: [i32; 2], contexts: [&[Probability]; 2]) -> [i32; 2] {
+        let Some(layer) = self.layers.find(self.key * self.grid.grid.nodes() + node, label) else { return [0, 0] };
+        let unit = (1u32 << KEY_BITS) as f32;
+        let step = (1u32 << self.settings.step_log2) as f32 / unit;
+        let free = self.settings.lambda > 0.0 && !self.visible(node, label);
+        let mut residual = [0, 0];
+        for axis in 0..2 {
+            let wanted = self.fit.uv[layer][axis].clamp(0.0, 65_535.0 / unit);
+            let exact = (wanted - predicted[axis] as f32 / unit) / step;
+            let nearest = libm::roundf(exact) as i32;
+            residual[axis] = nearest;
+            if !free || nearest == 0 {
+                continue;
+            }
+            // A ghost is seen through interpolation only: what its exact value gains is weighed against its bits.
+            let cost = |value: i32| {
+                let error = (value as f32 - exact) * step;
+                self.fit.weight[layer] * error * error + self.settings.lambda * range::price(contexts[axis], value) as f32
+            };
+            let mut best = (cost(nearest), nearest);
+            for value in [nearest - nearest.signum(), nearest / 2, 0] {
+                let candidate = (cost(value), value);
+                if candidate.0 < best.0 {
+                    best = candidate;
+                }
+            }
+            residual[axis] = best.1;
+        }
+        residual
+    }
+}

@@ -1,0 +1,185 @@
+//! Sheets: which labels each cell of the key-ray grid shows, interval by interval.
+//! From the G-buffer; `fit` gives every sheet's corners their positions, `order` sorts them front to back.
+
+use crate::gbuffer::GBuffer;
+use cubist_core::format::MAX_SHEETS;
+use cubist_core::grid::Grid;
+use rayon::prelude::*;
+
+/// The key-ray grid in space and time.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct KeyGrid {
+    /// The grid over the screen.
+    pub grid: Grid,
+    /// Screen width and height, pixels.
+    pub size: [usize; 2],
+    /// The frames at which keys stand, ascending, the first 0.
+    pub keys: Vec<u32>,
+    /// Frames of the path.
+    pub frames: u32,
+    /// The last interval leads back to the first key.
+    pub looping: bool,
+}
+
+impl KeyGrid {
+    /// Cells of 2^`cell_log2` pixels, keys every `interval` frames; without a loop the last key stands at the last frame.
+    #[must_use]
+    pub fn new(gbuffer: &GBuffer, cell_log2: u8, interval: u32, looping: bool) -> Self {
+        let last = gbuffer.frames.saturating_sub(1);
+        let mut keys: Vec<u32> = (0..gbuffer.frames).step_by(interval.max(1) as usize).collect();
+        if !looping && keys.last() != Some(&last) {
+            // A last interval of a frame or two costs a whole key: the one before it is made longer instead.
+            if keys.len() > 1 && last - keys[keys.len() - 1] <= interval / 4 {
+                keys.pop();
+            }
+            keys.push(last);
+        }
+        let size = [gbuffer.width as usize, gbuffer.height as usize];
+        let grid = Grid::new(gbuffer.width as u16, gbuffer.height as u16, cell_log2);
+        Self { grid, size, keys, frames: gbuffer.frames, looping }
+    }
+
+    /// Key intervals: between each two keys, on a looping path also back to the first; a single key has one.
+    #[must_use]
+    pub fn intervals(&self) -> usize {
+        if self.looping { self.keys.len() } else { (self.keys.len() - 1).max(1) }
+    }
+
+    /// The frame where interval `interval` ends (that of its second key).
+    #[must_use]
+    pub fn end(&self, interval: usize) -> u32 {
+        self.keys.get(interval + 1).copied().unwrap_or(if self.looping { self.frames } else { self.frames - 1 })
+    }
+
+    /// The frames that interval `interval` shows: the last of a path that does not loop shows its second key too.
+    #[must_use]
+    pub fn frames_of(&self, interval: usize) -> std::ops::Range<u32> {
+        let last = !self.looping && interval + 1 == self.intervals();
+        self.keys[interval]..if last { self.frames } else { self.end(interval) }
+    }
+
+    /// How far `frame` is into interval `interval`, 0..=1.
+    #[must_use]
+    pub fn fraction(&self, interval: usize, frame: u32) -> f32 {
+        let (start, end) = (self.keys[interval], self.end(interval));
+        if end == start { 0.0 } else { (frame - start) as f32 / (end - start) as f32 }
+    }
+
+    /// The key at the end of interval `interval`.
+    #[must_use]
+    pub fn second_key(&self, interval: usize) -> usize {
+        if self.keys.len() == 1 { 0 } else { (interval + 1) % self.keys.len() }
+    }
+
+    /// Columns and rows of pixels of a cell, cut off at the screen's edge.
+    #[must_use]
+    pub fn pixels(&self, cell: usize) -> [std::ops::Range<usize>; 2] {
+        let size = 1 << self.grid.log2;
+        let (column, row) = (cell % self.grid.columns, cell / self.grid.columns);
+        [column * size..((column + 1) * size).min(self.size[0]), row * size..((row + 1) * size).min(self.size[1])]
+    }
+
+    /// The nodes at a cell's corners: top left, top right, bottom left, bottom right.
+    #[must_use]
+    pub fn corners(&self, cell: usize) -> [usize; 4] {
+        let width = self.grid.node_columns();
+        let node = cell / self.grid.columns * width + cell % self.grid.columns;
+        [node, node + 1, node + width, node + width + 1]
+    }
+
+    /// Calls `f` with the index into the G-buffer and the position in the cell (across, down, in time; 0..=1 each) of every
+    /// pixel that a cell shows in an interval.
+    pub fn each_pixel(&self, interval: usize, cell: usize, mut f: impl FnMut(usize, [f32; 3])) {
+        let [columns, rows] = self.pixels(cell);
+        let scale = 1.0 / (1u32 << self.grid.log2) as f32;
+        for frame in self.frames_of(interval) {
+            let time = self.fraction(interval, frame);
+            for y in rows.clone() {
+                let row = (frame as usize * self.size[1] + y) * self.size[0];
+                for x in columns.clone() {
+                    f(row + x, [(x - columns.start) as f32 * scale, (y - rows.start) as f32 * scale, time]);
+                }
+            }
+        }
+    }
+}
+
+/// The sheets of every cell and interval, interval-major; labels, most seen last.
+#[derive(Clone, Debug)]
+pub struct Sheets {
+    /// Labels of the cell `interval * cells + cell`.
+    pub lists: Vec<Vec<u8>>,
+    /// Pixels whose sheet was left out.
+    pub dropped: u64,
+}
+
+/// Finds the sheets. A label seen in fewer than `least` pixels of a cell and interval is left out, unless it is all there is.
+#[must_use]
+pub fn find(gbuffer: &GBuffer, grid: &KeyGrid, least: u32) -> Sheets {
+    let cells = grid.grid.cells();
+    let found: Vec<(Vec<u8>, u64)> = (0..grid.intervals() * cells)
+        .into_par_iter()
+        .map(|index| {
+            let mut counts: Vec<(u8, u32)> = Vec::new();
+            grid.each_pixel(index / cells, index % cells, |pixel, _| {
+                let label = gbuffer.label[pixel] as u8;
+                match counts.iter_mut().find(|(l, _)| *l == label) {
+                    Some((_, count)) => *count += 1,
+                    None => counts.push((label, 1)),
+                }
+            });
+            // Most seen first, ties by label: what is cut off is the least.
+            counts.sort_by_key(|&(label, count)| (std::cmp::Reverse(count), label));
+            let kept = counts.iter().take(MAX_SHEETS).take_while(|&&(_, count)| count >= least).count().max(1);
+            let dropped = counts[kept..].iter().map(|&(_, count)| u64::from(count)).sum();
+            (counts[..kept].iter().rev().map(|&(label, _)| label).collect(), dropped)
+        })
+        .collect();
+    let dropped = found.iter().map(|(_, dropped)| dropped).sum();
+    Sheets { lists: found.into_iter().map(|(list, _)| list).collect(), dropped }
+}
+
+/// The layers that nodes carry: for every key and node the labels of the cells around it, in the intervals that end
+/// and start at the key; ascending, as the player derives them.
+#[derive(Clone, Debug)]
+pub struct Layers {
+    /// Where the layers of `key * nodes + node` start in `label`; one entry more.
+    pub start: Vec<u32>,
+    /// Labels.
+    pub label: Vec<u8>,
+}
+
+impl Layers {
+    /// The layers that `sheets` ask for.
+    #[must_use]
+    pub fn of(grid: &KeyGrid, sheets: &Sheets) -> Self {
+        let (cells, nodes) = (grid.grid.cells(), grid.grid.nodes());
+        let mut sets: Vec<Vec<u8>> = vec![Vec::new(); grid.keys.len() * nodes];
+        for (index, list) in sheets.lists.iter().enumerate() {
+            let (interval, cell) = (index / cells, index % cells);
+            for key in [interval, grid.second_key(interval)] {
+                for node in grid.corners(cell) {
+                    let set = &mut sets[key * nodes + node];
+                    for &label in list {
+                        if let Err(at) = set.binary_search(&label) {
+                            set.insert(at, label);
+                        }
+                    }
+                }
+            }
+        }
+        let mut layers = Self { start: vec![0], label: Vec::new() };
+        for set in sets {
+            layers.label.extend(set);
+            layers.start.push(layers.label.len() as u32);
+        }
+        layers
+    }
+
+    /// The index of the layer of `label` at node `node` of key `key`, `nodes` nodes a key.
+    #[must_use]
+    pub fn find(&self, key_node: usize, label: u8) -> Option<usize> {
+        let (from, to) = (self.start[key_node] as usize, self.start[key_node + 1] as usize);
+        self.label[from..to].binary_search(&label).ok().map(|at| from + at)
+    }
+}
