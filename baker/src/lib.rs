@@ -3,5 +3,10 @@
 //! ```text
 //! scene file -> Scene -> G-buffer -> charts, source image -> sheets -> fitted layers -> coded keys -> bytes
 //! ```
+pub mod atlas;
 pub mod camera;
+pub mod chart;
+pub mod gbuffer;
 pub mod scene;
+pub mod shade;
+pub mod trace;
