@@ -1,15 +1,108 @@
-//! The G-buffer.
-/// What every pixel of every frame sees, in the source image.
-#[derive(Clone, Debug)]
+//! The G-buffer: what every pixel of every frame sees.
+//! Rays come from the camera path, hits from [`Tracer`]; hits go to charting, and come back as labels and
+//! source-image coordinates for the sheets and the fit.
+
+use crate::scene::Scene;
+use crate::trace::Tracer;
+use glam::DVec3;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// The surface number of a ray that leaves the scene.
+pub const BACKGROUND: u32 = u32::MAX;
+
+/// The rays of one frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Lens {
+    /// The focal point.
+    pub eye: DVec3,
+    /// Unit vector into the scene.
+    pub forward: DVec3,
+    /// Distance of the screen in pixels.
+    pub focal: f64,
+    right: DVec3,
+    up: DVec3,
+    half: [f64; 2],
+}
+
+impl Lens {
+    /// The lens of frame `frame`; its rays equal those of [`crate::camera::Pose::direction`].
+    pub fn new(scene: &Scene, frame: u32) -> Self {
+        let play = &scene.playback;
+        let pose = scene.camera.pose(play.parameter(f64::from(frame)));
+        let focal = 0.5 * f64::from(play.height) / libm::tan(0.5 * pose.fov * core::f64::consts::PI / 180.0);
+        let half = [0.5 * f64::from(play.width), 0.5 * f64::from(play.height)];
+        Self { eye: pose.eye, forward: pose.forward, focal, right: pose.right, up: pose.up, half }
+    }
+
+    /// The unit direction through the continuous screen position (`x`, `y`).
+    pub fn direction(&self, x: f64, y: f64) -> DVec3 {
+        (self.forward * self.focal + self.right * (x - self.half[0]) + self.up * (self.half[1] - y)).normalize()
+    }
+}
+
+/// What one ray hits: 12 bytes, since a bake holds one for every pixel of every frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Twice the triangle, plus one for the back side where the side matters; [`BACKGROUND`] for none.
+    pub surface: u32,
+    /// Barycentric weight of the second corner.
+    pub b: f32,
+    /// Barycentric weight of the third corner.
+    pub c: f32,
+}
+
+/// One [`Sample`] at the centre of every pixel of every frame.
+pub struct Hits {
+    /// Pixels a row.
+    pub width: u32,
+    /// Rows a frame.
+    pub height: u32,
+    /// Number of frames.
+    pub frames: u32,
+    /// Frame-major, row-major.
+    pub samples: Vec<Sample>,
+}
+
+impl Hits {
+    /// Casts all rays; the same samples on any number of threads. `progress` hears (rays done, rays in all).
+    pub fn cast(scene: &Scene, tracer: &Tracer<'_>, progress: &(dyn Fn(u64, u64) + Sync)) -> Self {
+        let (width, height, frames) = (scene.playback.width, scene.playback.height, scene.playback.frames);
+        let row = width as usize;
+        let total = u64::from(width) * u64::from(height) * u64::from(frames);
+        let lenses: Vec<Lens> = (0..frames).map(|f| Lens::new(scene, f)).collect();
+        let sided: Vec<bool> = scene.materials.iter().map(|m| !scene.lights.is_empty() && !m.unlit).collect();
+        let mut samples = vec![Sample { surface: BACKGROUND, b: 0.0, c: 0.0 }; total as usize];
+        let done = AtomicU64::new(0);
+        samples.par_chunks_mut(row.max(1)).enumerate().for_each(|(line, out)| {
+            let lens = &lenses[line / height as usize];
+            let y = (line % height as usize) as f64 + 0.5;
+            for (x, sample) in out.iter_mut().enumerate() {
+                if let Some(hit) = tracer.hit(lens.eye, lens.direction(x as f64 + 0.5, y)) {
+                    let material = scene.triangles[hit.triangle as usize].material as usize;
+                    let side = u32::from(hit.back && sided.get(material).copied().unwrap_or(false));
+                    *sample = Sample { surface: hit.triangle * 2 + side, b: hit.bary[0] as f32, c: hit.bary[1] as f32 };
+                }
+            }
+            let now = done.fetch_add(row as u64, Ordering::Relaxed) + row as u64;
+            if line % 32 == 0 || now == total {
+                progress(now, total);
+            }
+        });
+        Self { width, height, frames, samples }
+    }
+}
+
+/// Where every pixel of every frame falls in the source image.
 pub struct GBuffer {
     /// Pixels a row.
     pub width: u32,
-    /// Rows.
+    /// Rows a frame.
     pub height: u32,
-    /// Frames.
+    /// Number of frames.
     pub frames: u32,
-    /// Labels, frame-major, row-major.
+    /// The label; 0 is the background. Frame-major, row-major.
     pub label: Vec<u16>,
-    /// Positions in the source image, texels.
+    /// Coordinates in texels: texel (i, j) covers [i, i + 1) x [j, j + 1). Same order as the labels.
     pub uv: Vec<[f32; 2]>,
 }

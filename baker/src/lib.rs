@@ -5,9 +5,8 @@
 //! ```
 pub mod atlas;
 pub mod camera;
-pub mod encode;
-pub mod fit;
+pub mod chart;
 pub mod gbuffer;
-pub mod order;
 pub mod scene;
-pub mod sheets;
+pub mod shade;
+pub mod trace;

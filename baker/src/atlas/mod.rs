@@ -1,35 +1,251 @@
-//! The source image.
-/// A label.
+//! The source image: every visible surface point once, flattened, packed, coloured.
+//! Charts come from [`crate::chart`]; the image and the G-buffer go to the sheets, the fit and the encoder.
+
+mod fill;
+mod pack;
+mod palette;
+
+use crate::chart::{self, Charting};
+use crate::gbuffer::{BACKGROUND, GBuffer, Hits};
+use crate::scene::{Background, Scene};
+use crate::shade::Shader;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU32, Ordering};
+use thiserror::Error;
+
+/// The most labels a source image has, the background included.
+pub const MAX_LABELS: usize = 4096;
+/// Labels beyond this are avoided by sharing them.
+const WANTED_LABELS: usize = 255;
+/// How far inside its label's rectangle a coordinate stays, texels.
+const INSIDE: f32 = 1.0 / 128.0;
+
+/// Why there is no source image.
+#[derive(Clone, Debug, Error, PartialEq, Eq)]
+pub enum AtlasError {
+    /// The largest side is out of range.
+    #[error("--atlas: expected a side of 64 to 1024 texels, found {0}; 512 is a good start")]
+    Side(u32),
+    /// The scene is in more pieces than the image has room for.
+    #[error("source image: {charts} charts do not fit into {side} x {side} texels; raise --atlas{}", if *.side < 1024 { "" } else { " or simplify the scene" })]
+    Room {
+        /// Charts to place.
+        charts: usize,
+        /// The largest side allowed.
+        side: u32,
+    },
+    /// The scene is in more pieces than there are labels.
+    #[error("source image: the charts need {found} labels, expected at most {MAX_LABELS}; lower --size or simplify the scene")]
+    Labels {
+        /// Labels needed.
+        found: usize,
+    },
+}
+
+/// What may be chosen about the source image.
 #[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// Largest side, texels: 64..=1024.
+    pub max_side: u32,
+    /// Texels a pixel, at most, where a chart is seen closest.
+    pub density: f64,
+    /// Palette entries, at most: 2..=256.
+    pub colours: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { max_side: 512, density: 1.0, colours: 256 }
+    }
+}
+
+/// A map from the screen that does not change: the background's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Fixed {
+    /// Texel coordinates of the screen's top left corner.
+    pub origin: [f32; 2],
+    /// Texels a pixel: uv = origin + (x, y) * step at the continuous screen position (x, y), pixel centres at halves.
+    pub step: [f32; 2],
+}
+
+/// What a label covers.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Label {
-    /// x0, y0, x1, y1.
+    /// x0, y0, x1, y1 in texels, the ends exclusive.
     pub rect: [u16; 4],
-    /// Masked.
+    /// Whether some texel of the rectangle is not covered.
     pub masked: bool,
-    /// Fixed to the screen.
+    /// Set for the background.
     pub fixed: Option<Fixed>,
 }
-/// Fixed.
-#[derive(Clone, Copy, Debug)]
-pub struct Fixed {
-    /// Origin.
-    pub origin: [f64; 2],
-    /// Step.
-    pub step: [f64; 2],
-}
-/// The source image.
+
+/// The one picture a bundle holds.
 #[derive(Clone, Debug)]
 pub struct SourceImage {
-    /// Texels a row.
+    /// Texels a row: 64, 128, 256, 512 or 1024.
     pub width: u32,
-    /// Rows.
+    /// Rows, a multiple of 4.
     pub height: u32,
-    /// Palette indices.
+    /// Palette indices, row-major.
     pub texels: Vec<u8>,
-    /// Colours.
+    /// Colours, each one an RGB565 value widened by repeating its leading bits.
     pub palette: Vec<[u8; 3]>,
-    /// Whether each texel belongs to a chart.
+    /// Which texels show a surface rather than continue one.
     pub covered: Vec<bool>,
-    /// Labels.
+    /// Label 0 is the background.
     pub labels: Vec<Label>,
+}
+
+/// What the reports say about the source image.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Figures {
+    /// Connected regions of the image.
+    pub charts: usize,
+    /// Labels, the background included.
+    pub labels: usize,
+    /// Share of texels covered.
+    pub fill: f64,
+    /// The densities were multiplied by this to make everything fit; at most 1.
+    pub scale: f64,
+    /// Texels between charts.
+    pub gutter: u32,
+}
+
+/// Where a chart lies and how it gets there.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    /// x0, y0, x1, y1, the ends exclusive.
+    pub rect: [u32; 4],
+    /// Texel coordinates of the flattened origin.
+    pub origin: [f64; 2],
+    /// Texels a unit of flattened length.
+    pub step: [f64; 2],
+}
+
+impl Place {
+    /// Texel coordinates of flattened coordinates, within the rectangle.
+    #[inline]
+    pub fn uv(&self, flat: [f64; 3]) -> [f32; 2] {
+        [0, 1].map(|k| {
+            let at = (self.origin[k] + flat[k] * self.step[k]) as f32;
+            at.clamp(self.rect[k] as f32 + INSIDE, self.rect[k + 2] as f32 - INSIDE)
+        })
+    }
+}
+
+/// Everything about the source image that later stages need.
+pub struct Atlas {
+    /// The picture.
+    pub image: SourceImage,
+    /// Where the pixels fall in it.
+    pub gbuffer: GBuffer,
+    /// For the reports.
+    pub figures: Figures,
+}
+
+/// Cuts what the hits see into charts, packs and colours them. `progress` hears (steps done, steps in all).
+/// Fails if the settings are out of range or there are more charts than room.
+pub fn build(scene: &Scene, hits: &Hits, settings: &Settings, progress: &(dyn Fn(u64, u64) + Sync)) -> Result<Atlas, AtlasError> {
+    if !(64..=1024).contains(&settings.max_side) {
+        return Err(AtlasError::Side(settings.max_side));
+    }
+    progress(0, 4);
+    let charting = chart::build(scene, hits, settings.density.clamp(0.05, 8.0), settings.max_side);
+    progress(1, 4);
+    let (label_of, labels) = chart::assign(hits, &charting, WANTED_LABELS - 1);
+    if labels + 1 > MAX_LABELS {
+        return Err(AtlasError::Labels { found: labels + 1 });
+    }
+    let backdrop = backdrop(scene, hits);
+    let layout = pack::pack(&charting, backdrop, settings.max_side)
+        .ok_or(AtlasError::Room { charts: charting.charts.len(), side: settings.max_side })?;
+    progress(2, 4);
+    let fixed = fixed(scene, &layout.backdrop);
+    let (gbuffer, seen) = locate(scene, hits, &charting, &layout, &label_of, &fixed);
+    let filled = fill::fill(scene, &Shader::new(scene), hits, &charting, &layout, &seen);
+    progress(3, 4);
+    let (texels, palette) = palette::reduce(&filled.colours, &seen.count, settings.colours.clamp(2, 256));
+    let labels = outline(&charting, &layout, &label_of, labels, fixed, &filled.covered);
+    let fill = filled.covered.iter().filter(|&&c| c).count() as f64 / filled.covered.len().max(1) as f64;
+    let figures = Figures { charts: charting.charts.len(), labels: labels.len(), fill, scale: layout.scale, gutter: layout.gutter };
+    progress(4, 4);
+    let image = SourceImage { width: layout.width, height: layout.height, texels, palette, covered: filled.covered, labels };
+    Ok(Atlas { image, gbuffer, figures })
+}
+
+/// The size the background wants: one colour needs little, a picture that is never seen as well.
+fn backdrop(scene: &Scene, hits: &Hits) -> [u32; 2] {
+    match scene.background {
+        Background::Image(_) if hits.samples.iter().any(|s| s.surface == BACKGROUND) => [hits.width, hits.height],
+        _ => [4, 4],
+    }
+}
+
+/// The background's map from the screen to its rectangle.
+fn fixed(scene: &Scene, rect: &[u32; 4]) -> Fixed {
+    let [x0, y0, x1, y1] = rect.map(|v| v as f32);
+    match scene.background {
+        Background::Colour(_) => Fixed { origin: [(x0 + x1) * 0.5, (y0 + y1) * 0.5], step: [0.0; 2] },
+        Background::Image(_) => Fixed {
+            origin: [x0, y0],
+            step: [(x1 - x0) / scene.playback.width.max(1) as f32, (y1 - y0) / scene.playback.height.max(1) as f32],
+        },
+    }
+}
+
+/// Which samples fall into each texel.
+pub(crate) struct Seen {
+    /// How many.
+    pub count: Vec<u32>,
+    /// The first of them; `u32::MAX` if there is none.
+    pub first: Vec<u32>,
+}
+
+/// The G-buffer, and what of it falls into each texel.
+fn locate(scene: &Scene, hits: &Hits, charting: &Charting, layout: &pack::Layout, label_of: &[u16], fixed: &Fixed) -> (GBuffer, Seen) {
+    let atomics = |value: u32| -> Vec<AtomicU32> { (0..layout.width * layout.height).map(|_| AtomicU32::new(value)).collect() };
+    let (count, first) = (atomics(0), atomics(u32::MAX));
+    let (width, height) = (hits.width as usize, hits.height as usize);
+    let mut label = vec![0u16; hits.samples.len()];
+    let mut uv = vec![[0f32; 2]; hits.samples.len()];
+    let rows = hits.samples.par_chunks(width.max(1)).zip(label.par_chunks_mut(width.max(1))).zip(uv.par_chunks_mut(width.max(1)));
+    rows.enumerate().for_each(|(line, ((samples, label), uv))| {
+        let y = (line % height.max(1)) as f32 + 0.5;
+        for (x, ((s, label), uv)) in samples.iter().zip(label).zip(uv).enumerate() {
+            if s.surface == BACKGROUND {
+                *uv = [fixed.origin[0] + (x as f32 + 0.5) * fixed.step[0], fixed.origin[1] + y * fixed.step[1]];
+            } else {
+                let face = charting.faces.of[s.surface as usize] as usize;
+                let chart = charting.chart_of[face] as usize;
+                *label = label_of[chart];
+                *uv = layout.places[chart].uv(charting.flat(face, f64::from(s.b), f64::from(s.c)));
+            }
+            let texel = uv[1] as usize * layout.width as usize + uv[0] as usize;
+            count[texel].fetch_add(1, Ordering::Relaxed);
+            first[texel].fetch_min((line * width + x) as u32, Ordering::Relaxed);
+        }
+    });
+    let plain = |v: Vec<AtomicU32>| v.into_iter().map(AtomicU32::into_inner).collect();
+    let frames = scene.playback.frames;
+    (GBuffer { width: hits.width, height: hits.height, frames, label, uv }, Seen { count: plain(count), first: plain(first) })
+}
+
+/// The labels: the rectangles around their charts.
+fn outline(charting: &Charting, layout: &pack::Layout, label_of: &[u16], count: usize, fixed: Fixed, covered: &[bool]) -> Vec<Label> {
+    let mut rects = vec![[u32::MAX, u32::MAX, 0, 0]; count + 1];
+    rects[0] = layout.backdrop;
+    for (chart, place) in layout.places.iter().enumerate().take(charting.charts.len()) {
+        let rect = &mut rects[usize::from(label_of[chart])];
+        let [x0, y0, x1, y1] = place.rect;
+        *rect = [rect[0].min(x0), rect[1].min(y0), rect[2].max(x1), rect[3].max(y1)];
+    }
+    rects
+        .into_iter()
+        .enumerate()
+        .map(|(i, [x0, y0, x1, y1])| {
+            let rows = (y0..y1).map(|y| (y * layout.width + x0) as usize..(y * layout.width + x1) as usize);
+            let masked = rows.into_iter().any(|row| covered[row].iter().any(|&c| !c));
+            Label { rect: [x0, y0, x1, y1].map(|v| v as u16), masked, fixed: (i == 0).then_some(fixed) }
+        })
+        .collect()
 }

@@ -1,0 +1,196 @@
+//! Colouring: what each texel shows, and what lies between the charts.
+//! Places come from the packing, colours from [`Shader`]; the coloured image goes to the palette.
+
+use super::pack::Layout;
+use super::{Place, Seen};
+use crate::chart::Charting;
+use crate::chart::{NONE, Projection};
+use crate::gbuffer::Hits;
+use crate::scene::Scene;
+use crate::shade::{Shader, is_hole};
+use glam::Vec3;
+use rayon::prelude::*;
+
+/// Rounds by which colours are continued beyond their charts, a texel each.
+const BEYOND: usize = 8;
+
+/// The image before its colours are reduced.
+pub(super) struct Filled {
+    /// 0..=255 a component, row-major.
+    pub colours: Vec<[u8; 3]>,
+    /// Which texels show a surface.
+    pub covered: Vec<bool>,
+}
+
+/// One texel of a chart while its colours are added up.
+#[derive(Clone, Copy)]
+struct Texel {
+    sum: Vec3,
+    samples: f32,
+    depth: f64,
+}
+
+/// Colours all charts and the background, and continues them into the gutters.
+pub(super) fn fill(scene: &Scene, shader: &Shader<'_>, hits: &Hits, charting: &Charting, layout: &Layout, seen: &Seen) -> Filled {
+    let mut members: Vec<Vec<u32>> = vec![Vec::new(); charting.charts.len()];
+    for (f, &c) in charting.chart_of.iter().enumerate() {
+        members[c as usize].push(f as u32);
+    }
+    let patches: Vec<Vec<Option<Vec3>>> = members
+        .par_iter()
+        .enumerate()
+        .map(|(c, faces)| Patch { scene, shader, hits, charting, layout, seen, chart: c, place: layout.places[c] }.colour(faces))
+        .collect();
+    let mut image: Vec<Option<Vec3>> = vec![None; (layout.width * layout.height) as usize];
+    let mut paste = |rect: [u32; 4], patch: &[Option<Vec3>]| {
+        let row = (rect[2] - rect[0]) as usize;
+        for (y, texels) in (rect[1]..rect[3]).zip(patch.chunks(row.max(1))) {
+            let start = (y * layout.width + rect[0]) as usize;
+            image[start..start + row].copy_from_slice(texels);
+        }
+    };
+    for (place, patch) in layout.places.iter().zip(&patches) {
+        paste(place.rect, patch);
+    }
+    let [x0, y0, x1, y1] = layout.backdrop;
+    let pixels = [f64::from(hits.width) / f64::from(x1 - x0), f64::from(hits.height) / f64::from(y1 - y0)];
+    let centres = (0..y1 - y0).flat_map(|y| (0..x1 - x0).map(move |x| (f64::from(x) + 0.5, f64::from(y) + 0.5)));
+    let backdrop: Vec<_> = centres.map(|(x, y)| Some(shader.background(x * pixels[0], y * pixels[1]))).collect();
+    paste(layout.backdrop, &backdrop);
+    let covered = image.iter().map(Option::is_some).collect();
+    for _ in 0..BEYOND {
+        image = continued(&image, layout.width as usize);
+    }
+    // What is too far from any chart to be seen costs least as one colour.
+    let rest = shader.background(0.0, 0.0);
+    let colours = image.iter().map(|t| t.unwrap_or(rest).to_array().map(|v| (v + 0.5).clamp(0.0, 255.0) as u8)).collect();
+    Filled { colours, covered }
+}
+
+/// One round of continuation: empty texels take the mean of their coloured neighbours.
+fn continued(image: &[Option<Vec3>], width: usize) -> Vec<Option<Vec3>> {
+    let height = image.len() / width.max(1);
+    let of = |i: usize| {
+        if image[i].is_some() {
+            return image[i];
+        }
+        let (x, y) = (i % width, i / width);
+        let (mut sum, mut count) = (Vec3::ZERO, 0.0);
+        for j in y.saturating_sub(1)..(y + 2).min(height) {
+            for k in x.saturating_sub(1)..(x + 2).min(width) {
+                if let Some(colour) = image[j * width + k] {
+                    sum += colour;
+                    count += 1.0;
+                }
+            }
+        }
+        (count > 0.0).then(|| sum / count)
+    };
+    (0..image.len()).into_par_iter().map(of).collect()
+}
+
+/// One chart and everything its colours depend on.
+struct Patch<'a> {
+    scene: &'a Scene,
+    shader: &'a Shader<'a>,
+    hits: &'a Hits,
+    charting: &'a Charting,
+    layout: &'a Layout,
+    seen: &'a Seen,
+    chart: usize,
+    place: Place,
+}
+
+impl Patch<'_> {
+    /// World units a texel covers; 0 for a texture copied texel by texel.
+    fn texel_size(&self) -> f64 {
+        match self.charting.charts[self.chart].projection {
+            Projection::Plane(_) => 1.0 / (self.place.step[0] * self.place.step[1]).sqrt(),
+            Projection::Texture => 0.0,
+        }
+    }
+
+    /// The first sample that falls into a texel of the chart: (face, sample).
+    fn first(&self, x: u32, y: u32) -> Option<(u32, crate::gbuffer::Sample)> {
+        let texel = ((self.place.rect[1] + y) * self.layout.width + self.place.rect[0] + x) as usize;
+        let sample = *self.hits.samples.get(self.seen.first[texel] as usize)?;
+        let face = *self.charting.faces.of.get(sample.surface as usize)?;
+        (face != NONE).then_some((face, sample))
+    }
+
+    /// The chart's texels, row-major; `None` where it shows nothing.
+    fn colour(&self, faces: &[u32]) -> Vec<Option<Vec3>> {
+        let [x0, y0, x1, y1] = self.place.rect;
+        let (width, height) = (x1 - x0, y1 - y0);
+        let mut texels = vec![Texel { sum: Vec3::ZERO, samples: 0.0, depth: f64::NAN }; (width * height) as usize];
+        let firsts: Vec<_> = (0..height).flat_map(|y| (0..width).map(move |x| self.first(x, y))).collect();
+        for (texel, first) in texels.iter_mut().zip(&firsts) {
+            if let Some((face, s)) = first {
+                texel.depth = self.charting.flat(*face as usize, f64::from(s.b), f64::from(s.c))[2];
+            }
+        }
+        for &face in faces {
+            self.draw(face, width, height, &firsts, &mut texels);
+        }
+        let size = self.texel_size();
+        let finish = |(texel, first): (&Texel, &Option<(u32, crate::gbuffer::Sample)>)| {
+            if texel.samples > 0.0 {
+                return Some(texel.sum / texel.samples);
+            }
+            // Too thin for a sample of its own, but seen.
+            first.as_ref().map(|(_, s)| self.shader.shade(s.surface, [f64::from(s.b), f64::from(s.c)], size))
+        };
+        texels.iter().zip(&firsts).map(finish).collect()
+    }
+
+    /// Adds one face: 2x2 samples a texel, one where texels are copied.
+    fn draw(&self, face: u32, width: u32, height: u32, firsts: &[Option<(u32, crate::gbuffer::Sample)>], texels: &mut [Texel]) {
+        let Place { rect, origin, step } = self.place;
+        let copied = matches!(self.charting.charts[self.chart].projection, Projection::Texture) && self.layout.scale >= 1.0;
+        let fine = if copied { 1.0 } else { 2.0 };
+        let corners = self.charting.corners[face as usize];
+        let [p, q, r] = corners.map(|c| [0, 1].map(|k| (origin[k] + c[k] * step[k] - f64::from(rect[k])) * fine));
+        let det = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+        if det.abs() < 1e-12 {
+            return;
+        }
+        let surface = self.charting.faces.list[face as usize].surface;
+        let size = self.texel_size();
+        let cosine = match self.charting.charts[self.chart].projection {
+            Projection::Plane(axes) => self.charting.faces.list[face as usize].normal.dot(axes[2]).abs().max(0.2),
+            Projection::Texture => 1.0,
+        };
+        let reach = size * (3.0 + 3.0 * (1.0 / (cosine * cosine) - 1.0).sqrt());
+        let range = |k: usize, most: u32| {
+            let (lo, hi) = (p[k].min(q[k]).min(r[k]), p[k].max(q[k]).max(r[k]));
+            let most = f64::from(most) * fine;
+            ((lo - 0.5).ceil().clamp(0.0, most) as u32)..((hi + 0.5).floor().clamp(0.0, most) as u32)
+        };
+        for j in range(1, height) {
+            for i in range(0, width) {
+                let at = [f64::from(i) + 0.5 - p[0], f64::from(j) + 0.5 - p[1]];
+                let b = (at[0] * (r[1] - p[1]) - at[1] * (r[0] - p[0])) / det;
+                let c = ((q[0] - p[0]) * at[1] - (q[1] - p[1]) * at[0]) / det;
+                if b.min(c).min(1.0 - b - c) < -1e-9 || is_hole(self.scene, surface / 2, [b, c]) {
+                    continue;
+                }
+                let index = ((f64::from(j) / fine) as u32 * width + (f64::from(i) / fine) as u32) as usize;
+                let depth = self.charting.flat(face as usize, b, c)[2];
+                let texel = &mut texels[index];
+                let nearer = depth - texel.depth;
+                if nearer.abs() > reach {
+                    // What the camera sees decides; where it sees nothing, what lies in front.
+                    if firsts[index].is_some() || nearer < 0.0 {
+                        continue;
+                    }
+                    *texel = Texel { sum: Vec3::ZERO, samples: 0.0, depth };
+                }
+                if texel.depth.is_nan() {
+                    texel.depth = depth;
+                }
+                texel.sum += self.shader.shade(surface, [b, c], size / fine);
+                texel.samples += 1.0;
+            }
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! Charts: which seen faces lie together in the source image, and how each is flattened there.
+//! Samples come from the G-buffer; charts go to the atlas, which places and colours them.
+
+mod absorb;
+mod fold;
+mod grow;
+mod islands;
+mod labels;
+mod measure;
+mod observe;
+
+use crate::gbuffer::Hits;
+use crate::scene::Scene;
+use glam::DVec3;
+
+pub use labels::assign;
+pub(crate) use observe::Faces;
+
+/// Not a face, not a chart.
+pub(crate) const NONE: u32 = u32::MAX;
+
+/// How a chart is flattened.
+#[derive(Clone, Copy, Debug)]
+pub enum Projection {
+    /// Along the third axis onto the first two; world units.
+    Plane([DVec3; 3]),
+    /// The scene's own texture coordinates; texels of the texture.
+    Texture,
+}
+
+/// A region of the source image on which the map from the surface is continuous.
+#[derive(Clone, Debug)]
+pub struct Chart {
+    /// The flattening.
+    pub projection: Projection,
+    /// Texels wanted per unit of flattened length.
+    pub density: f64,
+    /// Smallest flattened coordinates that are seen.
+    pub lo: [f64; 2],
+    /// Largest flattened coordinates that are seen.
+    pub hi: [f64; 2],
+    /// Pixels, over all frames, that see the chart.
+    pub hits: u64,
+}
+
+/// All charts of a scene.
+pub struct Charting {
+    /// The seen faces.
+    pub(crate) faces: Faces,
+    /// The chart of each seen face.
+    pub(crate) chart_of: Vec<u32>,
+    /// Flattened coordinates and depth of each seen face's corners.
+    pub(crate) corners: Vec<[[f64; 3]; 3]>,
+    /// The charts.
+    pub charts: Vec<Chart>,
+}
+
+impl Charting {
+    /// Flattened coordinates and depth of face `face` at barycentric `[b, c]`.
+    #[inline]
+    pub(crate) fn flat(&self, face: usize, b: f64, c: f64) -> [f64; 3] {
+        let [p, q, r] = &self.corners[face];
+        let a = 1.0 - b - c;
+        [0, 1, 2].map(|k| a * p[k] + b * q[k] + c * r[k])
+    }
+
+    /// Computes the faces' flattened corners from the charts' projections.
+    fn flatten(&mut self, scene: &Scene) {
+        self.corners = self
+            .faces
+            .list
+            .iter()
+            .zip(&self.chart_of)
+            .map(|(face, &chart)| match self.charts[chart as usize].projection {
+                Projection::Plane(axes) => face.position.map(|p| axes.map(|a| a.dot(p))),
+                Projection::Texture => {
+                    let t = &scene.triangles[(face.surface / 2) as usize];
+                    let size = islands::texture_size(scene, t.material);
+                    t.uv.map(|uv| [f64::from(uv.x) * size[0], f64::from(uv.y) * size[1], 0.0])
+                }
+            })
+            .collect();
+    }
+}
+
+/// Cuts what is seen into charts with at most `density` texels a pixel, for a source image of sides up to `max_side`.
+/// A scene that brings its own flattening (every triangle has an island) keeps it.
+pub fn build(scene: &Scene, hits: &Hits, density: f64, max_side: u32) -> Charting {
+    let own = !scene.triangles.is_empty() && scene.triangles.iter().all(|t| t.island.is_some());
+    let (faces, links) = observe::observe(scene, hits, !own);
+    if own {
+        return islands::build(scene, hits, faces);
+    }
+    let mut clusters = grow::grow(&faces, &links);
+    absorb::absorb(&faces, &links, &mut clusters, hits.samples.len());
+    let charts = clusters.normals.iter().map(|&n| Chart {
+        projection: Projection::Plane(measure::axes(n)),
+        density,
+        lo: [0.0; 2],
+        hi: [0.0; 2],
+        hits: 0,
+    });
+    let mut charting = Charting { charts: charts.collect(), chart_of: clusters.of, corners: Vec::new(), faces };
+    measure::measure(scene, hits, &mut charting, density, max_side);
+    if fold::split(hits, &mut charting, &links) {
+        measure::measure(scene, hits, &mut charting, density, max_side);
+    }
+    charting
+}

@@ -1,0 +1,228 @@
+//! Ray casting: the closest triangle along a ray, in double precision, without leaks between neighbours.
+//! Triangles come from a [`Scene`]; hits go to the G-buffer. The only file that names obvhs.
+
+use crate::gbuffer::{Hits, Lens};
+use crate::scene::Scene;
+use crate::shade::is_hole;
+use glam::DVec3;
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::cwbvh::CwBvh;
+use obvhs::cwbvh::builder::{build_cwbvh, build_cwbvh_from_tris};
+use obvhs::ray::{Ray, RayHit};
+use rayon::prelude::*;
+use std::time::{Duration, Instant};
+
+/// How far outside a triangle, in barycentric units, a ray still counts as inside it: neighbours overlap by this much.
+const OVERLAP: f64 = 1e-9;
+/// Distances that differ by less than this share are the same distance.
+const SAME: f64 = 1e-12;
+
+/// The closest surface point along a ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Distance from the origin in lengths of the ray's direction.
+    pub t: f64,
+    /// Index into [`Scene::triangles`].
+    pub triangle: u32,
+    /// Barycentric weights of the second and the third corner; each in 0..=1, their sum at most 1 up to rounding.
+    pub bary: [f64; 2],
+    /// Whether the ray meets the clockwise side.
+    pub back: bool,
+}
+
+/// A triangle in the order of the hierarchy's leaves, relative to the scene's centre.
+struct Leaf {
+    corner: DVec3,
+    edge: [DVec3; 2],
+    triangle: u32,
+    masked: bool,
+}
+
+impl Leaf {
+    /// Moeller-Trumbore; returns (t, b, c, whether the ray meets the back).
+    #[inline(always)]
+    fn intersect(&self, origin: DVec3, direction: DVec3) -> Option<(f64, f64, f64, bool)> {
+        let [e1, e2] = self.edge;
+        let p = direction.cross(e2);
+        let det = e1.dot(p);
+        if det == 0.0 {
+            return None;
+        }
+        let inverse = 1.0 / det;
+        let s = origin - self.corner;
+        let b = s.dot(p) * inverse;
+        if !(-1e-4..=1.0001).contains(&b) {
+            return None;
+        }
+        let q = s.cross(e1);
+        let c = direction.dot(q) * inverse;
+        let outside = -b.min(c).min(1.0 - b - c);
+        if outside > OVERLAP {
+            // The weights of far, small or grazing triangles are rounded by more than the overlap.
+            let rounding = 1e-15 * s.length() * direction.length() * (e1.length() + e2.length()) * inverse.abs();
+            if outside > 1e-4 || outside > rounding {
+                return None;
+            }
+        }
+        let t = e2.dot(q) * inverse;
+        // Seen against the normal e1 x e2 the determinant is positive.
+        (t > 0.0).then_some((t, b, c, det < 0.0))
+    }
+}
+
+/// A scene made ready for ray casting.
+pub struct Tracer<'a> {
+    scene: &'a Scene,
+    hierarchy: Option<CwBvh>,
+    leaves: Vec<Leaf>,
+    /// Single-precision boxes lose the least near the origin, so everything is moved there.
+    centre: DVec3,
+}
+
+/// A box as obvhs wants it.
+struct Padded(Aabb);
+
+impl obvhs::Boundable for Padded {
+    fn aabb(&self) -> Aabb {
+        self.0
+    }
+}
+
+/// The centre of the triangles and the reach of everything that happens: the farthest corner or eye from it.
+fn extent(scene: &Scene) -> (DVec3, f64) {
+    let (lo, hi) =
+        scene.triangles.iter().flat_map(|t| t.position).fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)));
+    let centre = (lo + hi) * 0.5;
+    let eyes = (0..scene.playback.frames).map(|f| scene.camera.pose(scene.playback.parameter(f64::from(f))).eye.distance(centre));
+    (centre, eyes.fold((hi - lo).length() * 0.5, f64::max))
+}
+
+/// Build settings: spatial splits would visit a triangle twice for little gain.
+fn parameters() -> BvhBuildParams {
+    BvhBuildParams::medium_build()
+}
+
+impl<'a> Tracer<'a> {
+    /// Builds the hierarchy; a scene without triangles is fine.
+    pub fn new(scene: &'a Scene) -> Self {
+        if scene.triangles.is_empty() {
+            return Self { scene, hierarchy: None, leaves: Vec::new(), centre: DVec3::ZERO };
+        }
+        let (centre, reach) = extent(scene);
+        let boxes: Vec<Padded> = scene
+            .triangles
+            .iter()
+            .map(|t| {
+                let [a, b, c] = t.position.map(|p| p - centre);
+                let (lo, hi) = (a.min(b).min(c), a.max(b).max(c));
+                // The box test rounds to single precision: about 3e-7 of the distance between ray and box.
+                let pad = 1e-4 * (hi - lo).max_element() + 2e-6 * reach;
+                Padded(Aabb::new((lo - pad).as_vec3a(), (hi + pad).as_vec3a()))
+            })
+            .collect();
+        let hierarchy = build_cwbvh(&boxes, parameters(), &mut Duration::default());
+        let leaves = hierarchy
+            .primitive_indices
+            .iter()
+            .map(|&triangle| {
+                let t = &scene.triangles[triangle as usize];
+                let [a, b, c] = t.position.map(|p| p - centre);
+                let masked = scene.materials.get(t.material as usize).is_some_and(|m| m.alpha_cutoff.is_some());
+                Leaf { corner: a, edge: [b - a, c - a], triangle, masked }
+            })
+            .collect();
+        Self { scene, hierarchy: Some(hierarchy), leaves, centre }
+    }
+
+    /// The closest hit in front of `origin`; of several at the same distance the one of the lowest triangle.
+    /// Texels that a material's alpha cuts out are passed through.
+    #[inline]
+    pub fn hit(&self, origin: DVec3, direction: DVec3) -> Option<Hit> {
+        let hierarchy = self.hierarchy.as_ref()?;
+        let origin = origin - self.centre;
+        let ray = Ray::new(origin.as_vec3a(), direction.as_vec3a(), 0.0, f32::INFINITY);
+        let mut best: Option<Hit> = None;
+        // A RayHit carries its bound along: a fresh one for each ray.
+        hierarchy.ray_traverse(ray, &mut RayHit::none(), |_, i| {
+            let leaf = &self.leaves[i];
+            let Some((t, b, c, back)) = leaf.intersect(origin, direction) else { return f32::INFINITY };
+            if let Some(best) = &best {
+                let same = (t - best.t).abs() <= SAME * best.t;
+                if if same { leaf.triangle >= best.triangle } else { t > best.t } {
+                    return f32::INFINITY;
+                }
+            }
+            let bary = [b.clamp(0.0, 1.0), c.clamp(0.0, 1.0)];
+            if leaf.masked && is_hole(self.scene, leaf.triangle, bary) {
+                return f32::INFINITY;
+            }
+            best = Some(Hit { t, triangle: leaf.triangle, bary, back });
+            // Rounded up, so that boxes at the same distance are still visited.
+            (t * 1.00001) as f32
+        });
+        best
+    }
+}
+
+/// Rays per second, in millions, wall clock, on the current number of threads.
+#[derive(Clone, Copy, Debug)]
+pub struct Throughput {
+    /// Rays cast for one measurement.
+    pub rays: u64,
+    /// The G-buffer stage as it is.
+    pub ours: f64,
+    /// obvhs with its own single-precision triangle test on the same rays, made beforehand.
+    pub obvhs_alone: f64,
+}
+
+/// Measures the G-buffer stage against obvhs alone on at most 8 frames of the scene; the best of three runs each.
+pub fn throughput(scene: &Scene) -> Throughput {
+    let frames = scene.playback.frames.min(8);
+    let (width, height) = (scene.playback.width, scene.playback.height);
+    let mut part = scene.clone();
+    part.playback.frames = frames;
+    let tracer = Tracer::new(&part);
+    let (centre, _) = extent(&part);
+    let triangles: Vec<obvhs::triangle::Triangle> = part
+        .triangles
+        .iter()
+        .map(|t| t.position.map(|p| (p - centre).as_vec3a()))
+        .map(|[v0, v1, v2]| obvhs::triangle::Triangle { v0, v1, v2 })
+        .collect();
+    let rays: Vec<Ray> = (0..frames)
+        .flat_map(|f| {
+            let lens = Lens::new(&part, f);
+            (0..height).flat_map(move |y| (0..width).map(move |x| (lens.eye, lens.direction(f64::from(x) + 0.5, f64::from(y) + 0.5))))
+        })
+        .map(|(eye, direction)| Ray::new_inf((eye - centre).as_vec3a(), direction.as_vec3a()))
+        .collect();
+    let count = rays.len() as u64;
+    let rate = |time: Duration| count as f64 / time.as_secs_f64().max(1e-9) / 1e6;
+    let (mut ours, mut alone) = (0.0f64, 0.0f64);
+    if triangles.is_empty() || rays.is_empty() {
+        return Throughput { rays: count, ours, obvhs_alone: alone };
+    }
+    let hierarchy = build_cwbvh_from_tris(&triangles, parameters(), &mut Duration::default());
+    let ordered: Vec<_> = hierarchy.primitive_indices.iter().map(|&i| triangles[i as usize]).collect();
+    let mut found = vec![RayHit::none(); rays.len()];
+    for _ in 0..3 {
+        let start = Instant::now();
+        let hits = Hits::cast(&part, &tracer, &|_, _| {});
+        ours = ours.max(rate(start.elapsed()));
+        assert_eq!(hits.samples.len(), rays.len());
+        let start = Instant::now();
+        found.par_chunks_mut(width as usize).zip(rays.par_chunks(width as usize)).for_each(|(found, rays)| {
+            for (found, ray) in found.iter_mut().zip(rays) {
+                *found = RayHit::none();
+                hierarchy.ray_traverse(*ray, found, |ray, i| ordered[i].intersect(ray));
+            }
+        });
+        alone = alone.max(rate(start.elapsed()));
+    }
+    Throughput { rays: count, ours, obvhs_alone: alone }
+}
+
+#[cfg(test)]
+#[path = "trace_tests.rs"]
+mod tests;
