@@ -2,9 +2,9 @@
 //! A path comes in from `cli`; checked bytes go to the commands. Their results go to standard output through here.
 
 use crate::bake::{Scene, bake};
+use crate::progress::progress;
 use anyhow::{Context, Result, anyhow};
 use cubist_core::Bundle;
-use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{ErrorKind, Write};
 use std::path::Path;
 
@@ -40,8 +40,7 @@ pub fn load(path: Option<&Path>) -> Result<Loaded> {
 
 /// Checks the bytes; the error names the file.
 pub fn parse(loaded: &Loaded) -> Result<Bundle<'_>> {
-    let hint = "expected a bundle made by `cubist-bake SCENE -o OUT.cubist`";
-    Bundle::parse(&loaded.bytes).map_err(|e| anyhow!("{}: {e} ({} bytes; {hint})", loaded.name, loaded.bytes.len()))
+    Bundle::parse(&loaded.bytes).map_err(|e| anyhow!("{}: {e}; bake it afresh with `cubist-bake SCENE -o OUT.cubist`", loaded.name))
 }
 
 /// Working memory for a bundle.
@@ -62,8 +61,7 @@ pub fn print(text: &str) -> Result<()> {
 }
 
 fn baked(name: String, scene: Scene<'_>) -> Result<Loaded> {
-    let style = ProgressStyle::with_template("{msg:10} [{wide_bar}] {percent} % {eta}").unwrap_or_else(|_| ProgressStyle::default_bar());
-    let bar = ProgressBar::new(1000).with_style(style);
+    let bar = progress(1000, "bake");
     let result = bake(scene, &|stage, done| {
         bar.set_message(stage.to_owned());
         bar.set_position((done.clamp(0.0, 1.0) * 1000.0) as u64);

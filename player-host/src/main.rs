@@ -4,6 +4,9 @@
 mod bake;
 mod canvas;
 mod cli;
+#[cfg(test)]
+#[path = "../tests/common/mod.rs"]
+mod common;
 mod files;
 mod headless;
 mod input;
@@ -11,6 +14,7 @@ mod keys;
 mod measure;
 mod overlay;
 mod picture;
+mod progress;
 mod render;
 mod stage;
 mod text;
@@ -53,7 +57,7 @@ fn show(args: &Show) -> Result<()> {
         window::connect()
             .inspect_err(|reason| {
                 let instead = args.shot.as_deref().unwrap_or(&args.out).display();
-                eprintln!("No display ({reason}): no window, but files: {instead}");
+                eprintln!("No display ({reason}): writing files instead of opening a window: {instead}");
             })
             .ok()
     };

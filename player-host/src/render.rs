@@ -5,11 +5,11 @@ use crate::cli::{Render, Usage};
 use crate::files::{write_png, write_with};
 use crate::input::print;
 use crate::picture::Picture;
+use crate::progress::progress;
 use anyhow::{Context, Result};
 use cubist_core::Player;
 use image::codecs::gif::{GifEncoder, Repeat};
 use image::{Delay, DynamicImage};
-use indicatif::{ProgressBar, ProgressStyle};
 use std::ops::Range;
 use std::path::Path;
 
@@ -53,7 +53,7 @@ pub fn write(player: &mut Player<'_>, plan: &Plan<'_>) -> Result<()> {
     let mut picture = Picture::new(width, height);
     if let Some(folder) = plan.out {
         std::fs::create_dir_all(folder).with_context(|| format!("{}: the folder cannot be made", folder.display()))?;
-        let bar = bar(frames.len(), "pictures");
+        let bar = progress(frames.len() as u64, "pictures");
         for &frame in &frames {
             picture.play(player, frame);
             write_png(&folder.join(format!("frame-{frame:04}.png")), &picture.to_rgb(plan.scale))?;
@@ -64,7 +64,7 @@ pub fn write(player: &mut Player<'_>, plan: &Plan<'_>) -> Result<()> {
     }
     if let Some(path) = plan.gif {
         let timed = delays(frames.len(), plan.every, player.bundle().fps());
-        let bar = bar(timed.len(), "gif");
+        let bar = progress(timed.len() as u64, "gif");
         write_with(path, |out| {
             let mut encoder = GifEncoder::new_with_speed(out, 10);
             encoder.set_repeat(Repeat::Infinite)?;
@@ -107,12 +107,6 @@ fn delays(count: usize, every: u32, fps: u16) -> Vec<(usize, u32)> {
         .zip(ends)
         .map(|(&i, end)| (i, u32::try_from((start(end) - start(i)).max(2)).unwrap_or(u32::MAX).min(u16::MAX.into())))
         .collect()
-}
-
-/// A bar on standard error; indicatif hides it when that is no terminal.
-fn bar(length: usize, what: &'static str) -> ProgressBar {
-    let style = ProgressStyle::with_template("{msg:10} [{wide_bar}] {pos}/{len} {eta}").unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(length as u64).with_style(style).with_message(what)
 }
 
 #[cfg(test)]

@@ -208,3 +208,106 @@ impl<'a> Stage<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::common::{SIZE, bundle};
+    use cubist_core::Bundle;
+
+    const ZERO: Duration = Duration::ZERO;
+
+    /// Runs `test` with a stage over the tests' bundle and a canvas of its natural size.
+    fn on_stage(test: impl FnOnce(Stage<'_>, Canvas)) {
+        let bytes = bundle();
+        let parsed = Bundle::parse(&bytes).unwrap();
+        let mut memory = vec![0; parsed.memory_needed()];
+        let player = Player::new(&parsed, &mut memory).unwrap();
+        let stage = Stage::new(player, bytes.len(), parsed.memory_needed(), None, ZERO);
+        let (width, height) = stage.natural_size((400, 300), 1, ZERO);
+        test(stage, Canvas::new(width, height).unwrap());
+    }
+
+    #[test]
+    fn a_picture_is_due_at_the_deadline_and_not_before() {
+        on_stage(|mut stage, mut canvas| {
+            assert!(stage.outdated(ZERO));
+            stage.compose(&mut canvas, 1, ZERO);
+            let due = stage.deadline(ZERO).unwrap();
+            assert!(!stage.outdated(due - Duration::from_nanos(1)));
+            assert!(stage.outdated(due));
+            stage.compose(&mut canvas, 1, due);
+            assert_eq!(stage.frame().1, 1);
+            assert_eq!(stage.act(Action::Play, due), Wish::Nothing);
+            stage.compose(&mut canvas, 1, due);
+            assert_eq!((stage.deadline(due), stage.outdated(due + Duration::from_secs(9))), (None, false));
+        });
+    }
+
+    #[test]
+    fn dragging_the_timeline_scrubs_and_letting_go_plays_on() {
+        on_stage(|mut stage, mut canvas| {
+            stage.compose(&mut canvas, 1, ZERO);
+            let (width, height) = canvas.size();
+            let row = (0..height).rev().find(|&y| stage.layout.as_ref().unwrap().on_timeline(50.0, y.into())).unwrap();
+            stage.press(50.0, 5.0, ZERO);
+            stage.drag(f64::from(width), ZERO);
+            assert!(!stage.transport.held(), "a press on the picture takes nothing");
+            stage.press(f64::from(width) / 2.0, row.into(), ZERO);
+            stage.compose(&mut canvas, 1, Duration::from_secs(7));
+            assert_eq!(stage.frame().1, SIZE.2 / 2);
+            stage.drag(f64::from(width) + 100.0, ZERO);
+            stage.compose(&mut canvas, 1, ZERO);
+            assert_eq!(stage.frame().1, SIZE.2 - 1);
+            stage.drag(0.0, ZERO);
+            stage.release(ZERO);
+            stage.compose(&mut canvas, 1, Duration::from_millis(70));
+            assert_eq!(stage.frame().1, 2);
+        });
+    }
+
+    #[test]
+    fn messages_go_away_by_themselves() {
+        on_stage(|mut stage, mut canvas| {
+            stage.act(Action::Play, ZERO);
+            stage.compose(&mut canvas, 1, ZERO);
+            let bare = canvas.at(8, 8);
+            stage.say("saved".to_owned(), ZERO);
+            stage.compose(&mut canvas, 1, ZERO);
+            assert_ne!(canvas.at(8, 8), bare, "the plate is there");
+            let end = stage.deadline(ZERO).unwrap();
+            assert!(stage.outdated(end));
+            stage.compose(&mut canvas, 1, end);
+            assert_eq!((canvas.at(8, 8), stage.deadline(end)), (bare, None));
+        });
+    }
+
+    #[test]
+    fn the_overlay_goes_and_comes() {
+        on_stage(|mut stage, mut canvas| {
+            stage.compose(&mut canvas, 1, ZERO);
+            let corner = canvas.at(0, canvas.size().1 - 1);
+            stage.act(Action::Overlay, ZERO);
+            stage.compose(&mut canvas, 1, ZERO);
+            assert_ne!(canvas.at(0, canvas.size().1 - 1), corner);
+            stage.press(50.0, f64::from(canvas.size().1) - 30.0, ZERO);
+            assert!(!stage.transport.held(), "no timeline, nothing to take");
+            assert_eq!(stage.act(Action::Screenshot, ZERO), Wish::Screenshot);
+            assert_eq!(stage.act(Action::Quit, ZERO), Wish::Quit);
+        });
+    }
+
+    #[test]
+    fn the_measured_rate_is_of_the_last_second() {
+        on_stage(|mut stage, mut canvas| {
+            let mut now = ZERO;
+            for _ in 0..50 {
+                stage.compose(&mut canvas, 1, now);
+                now = stage.deadline(now).unwrap();
+            }
+            let rate = stage.status(now).shown_fps;
+            assert!((rate - f64::from(SIZE.3)).abs() < 0.1, "{rate}");
+            assert!(stage.times.len() <= SIZE.3 as usize + 1);
+        });
+    }
+}

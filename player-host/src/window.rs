@@ -27,7 +27,8 @@ pub fn connect() -> Result<EventLoop<()>> {
     if needs_server && !set("DISPLAY") && !set("WAYLAND_DISPLAY") {
         return Err(anyhow!("neither DISPLAY nor WAYLAND_DISPLAY is set"));
     }
-    EventLoop::new().map_err(|e| anyhow!("{e}"))
+    // winit puts the place in its own source before the reason.
+    EventLoop::new().map_err(|e| anyhow!("{}", e.to_string().rsplit(": ").next().unwrap_or("the window system does not answer")))
 }
 
 /// Shows `stage` until the window is closed or, with `limit`, until that many pictures have been shown one frame after the other;
