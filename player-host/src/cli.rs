@@ -50,7 +50,7 @@ pub struct Show {
     /// Where the files go when there is no window.
     #[arg(long, value_name = "DIR", default_value = "cubist-demo")]
     pub out: PathBuf,
-    /// Screen pixels to a pixel of the picture; left out: as many as fit.
+    /// The window opens with N screen pixels to a pixel of the picture; left out: as many as fit the screen.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=16))]
     pub scale: Option<u32>,
 }

@@ -28,8 +28,8 @@ pub struct Status {
     pub speed_eighths: u16,
     /// What happens at the ends.
     pub ends: Ends,
-    /// Pictures shown in a second, measured.
-    pub shown_fps: f64,
+    /// Pictures shown in a second, measured; none while the film stands still.
+    pub shown_fps: Option<f64>,
     /// Frames per second the bundle asks for.
     pub fps: u16,
     /// Bytes of the bundle.
@@ -57,14 +57,9 @@ impl Status {
         let speed = speed_text(self.speed_eighths);
         let drawn = (self.work.smooth_pixels + self.work.torn_pixels).max(1);
         let torn = 100.0 * f64::from(self.work.torn_pixels) / f64::from(drawn);
+        let shown = self.shown_fps.map_or("-".to_owned(), |fps| format!("{:.1}", fps.min(999.9)));
         [
-            format!(
-                "{state} {:>digits$}/{} {:>5.1}/{} fps {speed:<4} {ends}",
-                self.frame,
-                self.frames,
-                self.shown_fps.min(999.9),
-                self.fps
-            ),
+            format!("{state} {:>digits$}/{} {shown:>5}/{} fps {speed:<4} {ends}", self.frame, self.frames, self.fps),
             format!(
                 "{} B, {} B/frame, memory {} B",
                 grouped(self.bundle_bytes as u64),
@@ -109,9 +104,9 @@ pub struct Layout {
 }
 
 impl Layout {
-    /// Divides a window of `window` pixels, `ui` of them to a point: the picture centred at the largest whole zoom (or `zoom`)
+    /// Divides a window of `window` pixels, `ui` of them to a point: the picture centred at the largest whole zoom
     /// in what the strip leaves. A picture larger than that is cut at the edges, never shrunk.
-    pub fn new(window: (u32, u32), picture: (u32, u32), ui: u32, zoom: Option<u32>, status: Option<&Status>) -> Self {
+    pub fn new(window: (u32, u32), picture: (u32, u32), ui: u32, status: Option<&Status>) -> Self {
         let (width, height) = (window.0 as i32, window.1 as i32);
         let ui = ui.max(1) as i32;
         let face = Face::fitting(width, ui);
@@ -121,8 +116,7 @@ impl Layout {
         let top = (height - strip_height).max(0);
         let strip = status.map(|_| Area { x: 0, y: top, width, height: strip_height });
         let timeline = Area { x: margin, y: top + 7 * ui, width: (width - 2 * margin).max(1), height: 6 * ui };
-        let fitting = (width / picture.0.max(1) as i32).min(top / picture.1.max(1) as i32).max(1) as u32;
-        let zoom = zoom.unwrap_or(fitting);
+        let zoom = (width / picture.0.max(1) as i32).min(top / picture.1.max(1) as i32).max(1) as u32;
         let corner = ((width - (picture.0 * zoom) as i32) / 2, (top - (picture.1 * zoom) as i32) / 2);
         Self { picture: corner, zoom, strip, timeline, lines, face, ui }
     }
@@ -130,7 +124,7 @@ impl Layout {
     /// The window size that holds the picture at `zoom` and the strip, nothing more.
     pub fn natural_size(picture: (u32, u32), ui: u32, zoom: u32, status: &Status) -> (u32, u32) {
         let width = (picture.0 * zoom).max(200 * ui);
-        let strip = Self::new((width, 1), picture, ui, None, Some(status)).strip.map_or(0, |s| s.height as u32);
+        let strip = Self::new((width, 1), picture, ui, Some(status)).strip.map_or(0, |s| s.height as u32);
         (width, picture.1 * zoom + strip)
     }
 
@@ -222,7 +216,7 @@ mod tests {
             backwards: false,
             speed_eighths: 8,
             ends: Ends::Loop,
-            shown_fps: 29.94,
+            shown_fps: Some(29.94),
             fps: 30,
             bundle_bytes: 91_234,
             memory: 14_336,
@@ -244,7 +238,7 @@ mod tests {
     fn groups_keep_their_length_from_frame_to_frame() {
         let lengths = |s: Status| s.groups().map(|g| g.len());
         let still =
-            Status { playing: false, frame: 7, shown_fps: 0.0, speed_eighths: 1, ends: Ends::PingPong, work: Work::default(), ..status() };
+            Status { playing: false, frame: 7, shown_fps: None, speed_eighths: 1, ends: Ends::PingPong, work: Work::default(), ..status() };
         assert_eq!(lengths(status()), lengths(still));
     }
 
@@ -260,7 +254,7 @@ mod tests {
     fn the_natural_size_holds_the_picture_at_its_zoom() {
         for (picture, ui, zoom) in [((320, 240), 1, 3), ((240, 320), 2, 1), ((128, 64), 1, 2)] {
             let window = Layout::natural_size(picture, ui, zoom, &status());
-            let layout = Layout::new(window, picture, ui, None, Some(&status()));
+            let layout = Layout::new(window, picture, ui, Some(&status()));
             assert!(layout.zoom >= zoom && layout.picture.0 >= 0, "{picture:?}");
             assert_eq!(layout.picture.1, 0, "{picture:?}");
         }
@@ -268,20 +262,20 @@ mod tests {
 
     #[test]
     fn the_picture_is_centred_in_what_the_strip_leaves() {
-        let bare = Layout::new((700, 500), (320, 240), 1, None, None);
+        let bare = Layout::new((700, 500), (320, 240), 1, None);
         assert_eq!((bare.zoom, bare.picture), (2, (30, 10)));
         assert!(!bare.on_timeline(350.0, 495.0));
-        let with = Layout::new((700, 500), (320, 240), 1, None, Some(&status()));
+        let with = Layout::new((700, 500), (320, 240), 1, Some(&status()));
         let strip = with.strip.unwrap();
         assert_eq!(strip.y + strip.height, 500);
         assert_eq!((with.zoom, with.picture), (1, (190, (strip.y - 240) / 2)));
-        let tiny = Layout::new((1, 1), (320, 240), 3, None, Some(&status()));
+        let tiny = Layout::new((1, 1), (320, 240), 3, Some(&status()));
         assert_eq!(tiny.zoom, 1);
     }
 
     #[test]
     fn the_timeline_maps_points_to_frames() {
-        let layout = Layout::new((812, 600), (320, 240), 1, None, Some(&status()));
+        let layout = Layout::new((812, 600), (320, 240), 1, Some(&status()));
         assert_eq!(layout.timeline.width, 800);
         let frames: Vec<_> = [-50.0, 6.0, 105.9, 106.0, 805.9, 5000.0].map(|x| layout.frame_at(x, 8)).into();
         assert_eq!(frames, [0, 0, 0, 1, 7, 7]);
@@ -302,7 +296,7 @@ mod tests {
     #[test]
     fn the_handle_sits_on_the_middle_of_its_frame() {
         let mut canvas = Canvas::new(172, 80).unwrap();
-        let layout = Layout::new(canvas.size(), (40, 10), 1, None, Some(&status()));
+        let layout = Layout::new(canvas.size(), (40, 10), 1, Some(&status()));
         layout.draw(&mut canvas, &status());
         // 160 pixels for 8 frames: frame 2 covers 46..66.
         let seen = ascii(&canvas, Area { x: 46, y: layout.timeline.y - 4, width: 22, height: 14 });
@@ -329,7 +323,7 @@ mod tests {
     fn help_and_messages_stay_inside_any_window() {
         for size in [(1, 1), (30, 20), (400, 300)] {
             let mut canvas = Canvas::new(size.0, size.1).unwrap();
-            let layout = Layout::new(size, (320, 240), 2, None, Some(&status()));
+            let layout = Layout::new(size, (320, 240), 2, Some(&status()));
             layout.draw(&mut canvas, &status());
             layout.draw_help(&mut canvas);
             layout.draw_message(&mut canvas, "saved");

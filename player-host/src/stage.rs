@@ -48,7 +48,7 @@ pub struct Stage<'a> {
 }
 
 impl<'a> Stage<'a> {
-    /// Plays from `now`. `bundle_bytes` and `memory` are shown; `zoom` fixes the screen pixels to a picture pixel.
+    /// Plays from `now`. `bundle_bytes` and `memory` are shown; `zoom` is that of the window's first size.
     pub fn new(player: Player<'a>, bundle_bytes: usize, memory: usize, zoom: Option<u32>, now: Duration) -> Self {
         let bundle = player.bundle();
         let (width, height) = bundle.size();
@@ -161,6 +161,9 @@ impl<'a> Stage<'a> {
             self.drawn = Some((frame, work));
             self.times.push_back(now);
         }
+        if !self.transport.playing() || self.transport.held() {
+            self.times.clear();
+        }
         while self.times.front().is_some_and(|&t| t + RATE_WINDOW < now) {
             self.times.pop_front();
         }
@@ -168,7 +171,7 @@ impl<'a> Stage<'a> {
             self.message = None;
         }
         let status = self.status(now);
-        let layout = Layout::new(canvas.size(), self.picture.size(), ui, self.zoom, self.overlay.then_some(&status));
+        let layout = Layout::new(canvas.size(), self.picture.size(), ui, self.overlay.then_some(&status));
         canvas.clear(BACKGROUND);
         canvas.picture(&self.picture, layout.picture.0, layout.picture.1, layout.zoom);
         layout.draw(canvas, &status);
@@ -190,8 +193,8 @@ impl<'a> Stage<'a> {
     fn status(&self, now: Duration) -> Status {
         let (frame, work) = self.drawn.unwrap_or_default();
         let shown_fps = match (self.times.front(), self.times.back()) {
-            (Some(&first), Some(&last)) if last > first => (self.times.len() - 1) as f64 / (last - first).as_secs_f64(),
-            _ => 0.0,
+            (Some(&first), Some(&last)) if last > first => Some((self.times.len() - 1) as f64 / (last - first).as_secs_f64()),
+            _ => None,
         };
         Status {
             frame,
@@ -305,9 +308,12 @@ mod tests {
                 stage.compose(&mut canvas, 1, now);
                 now = stage.deadline(now).unwrap();
             }
-            let rate = stage.status(now).shown_fps;
+            let rate = stage.status(now).shown_fps.unwrap();
             assert!((rate - f64::from(SIZE.3)).abs() < 0.1, "{rate}");
             assert!(stage.times.len() <= SIZE.3 as usize + 1);
+            stage.act(Action::Step(1), now);
+            stage.compose(&mut canvas, 1, now);
+            assert_eq!(stage.status(now).shown_fps, None);
         });
     }
 }
