@@ -1,0 +1,72 @@
+//! What the user gave, as a bundle: read from a file, or baked from a scene.
+//! A path comes in from `cli`; checked bytes go to the commands. Their results go to standard output through here.
+
+use crate::bake::{Scene, bake};
+use crate::progress::progress;
+use anyhow::{Context, Result, anyhow};
+use cubist_core::Bundle;
+use std::io::{ErrorKind, Write};
+use std::path::Path;
+
+/// The scene that plays when nothing is given.
+const DEMO: &str = "street";
+/// Endings of files that are baked rather than played.
+const SCENES: [&str; 5] = ["toml", "glb", "gltf", "obj", "ply"];
+
+/// A bundle's bytes and where they come from.
+pub struct Loaded {
+    /// The file's name as given, or the built-in scene's.
+    pub name: String,
+    /// The bundle.
+    pub bytes: Vec<u8>,
+    /// What the baker reports, as rows for a table; empty for a bundle read from a file.
+    pub rows: Vec<(String, String)>,
+}
+
+/// Reads a bundle, or bakes a scene (told by its ending), or bakes the demo when `path` is none.
+pub fn load(path: Option<&Path>) -> Result<Loaded> {
+    let Some(path) = path else {
+        return baked(DEMO.to_owned(), Scene::Builtin(DEMO));
+    };
+    let name = path.display().to_string();
+    let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
+    if ending.is_some_and(|e| SCENES.contains(&e.as_str())) {
+        return baked(name, Scene::File(path));
+    }
+    let bytes = std::fs::read(path)
+        .with_context(|| format!("{name}: cannot be read; expected a bundle (made by `cubist-bake SCENE -o OUT.cubist`)"))?;
+    Ok(Loaded { name, bytes, rows: Vec::new() })
+}
+
+/// Checks the bytes; the error names the file.
+pub fn parse(loaded: &Loaded) -> Result<Bundle<'_>> {
+    Bundle::parse(&loaded.bytes).map_err(|e| anyhow!("{}: {e}; bake it afresh with `cubist-bake SCENE -o OUT.cubist`", loaded.name))
+}
+
+/// Working memory for a bundle.
+pub fn memory(bundle: &Bundle<'_>) -> Result<Vec<u8>> {
+    let needed = bundle.memory_needed();
+    let mut memory = Vec::new();
+    memory.try_reserve_exact(needed).with_context(|| format!("the bundle asks for {needed} bytes of working memory"))?;
+    memory.resize(needed, 0);
+    Ok(memory)
+}
+
+/// Prints a result; a reader that has gone away, as in `| head`, is no error.
+pub fn print(text: &str) -> Result<()> {
+    match writeln!(std::io::stdout(), "{text}") {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error).context("standard output cannot be written"),
+        _ => Ok(()),
+    }
+}
+
+fn baked(name: String, scene: Scene<'_>) -> Result<Loaded> {
+    let bar = progress(1000, "bake");
+    let result = bake(scene, &|stage, done| {
+        bar.set_message(stage.to_owned());
+        bar.set_position((done.clamp(0.0, 1.0) * 1000.0) as u64);
+    });
+    bar.finish_and_clear();
+    let (bytes, rows) = result?;
+    Ok(Loaded { name, bytes, rows })
+}
