@@ -4,9 +4,14 @@
 //! scene file -> Scene -> G-buffer -> charts, source image -> sheets -> fitted layers -> coded keys -> bytes
 //! ```
 pub mod atlas;
+pub mod bake;
 pub mod camera;
 pub mod chart;
+pub mod encode;
+pub mod fit;
 pub mod gbuffer;
+pub mod order;
 pub mod scene;
 pub mod shade;
+pub mod sheets;
 pub mod trace;

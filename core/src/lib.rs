@@ -52,5 +52,5 @@ mod timeline;
 pub use bundle::{Bundle, checksum};
 pub use error::{BundleError, MemoryError};
 pub use graphics::FrameImage;
-pub use player::{ByteOrder, Frame, Player, Work};
+pub use player::{ByteOrder, Frame, Player, Probe, Work};
 pub use timeline::Moment;

@@ -1,12 +1,14 @@
 //! The player: new, seek, row. Keys are decoded into the caller's memory by `seek`, pixels are made by `row`.
 
+use crate::cell::{NodeRow, RowSheets};
 use crate::coder::Decoder;
 use crate::coverage::Chart;
+use crate::fixed::PlayUv;
 use crate::format::Limits;
 use crate::key::Nothing;
 use crate::memory::{self, Workspace};
 use crate::record::{KEYS, Shape};
-use crate::span::Paint;
+use crate::span;
 use crate::timeline::Moment;
 use crate::{Bundle, MemoryError};
 
@@ -39,6 +41,15 @@ pub struct Work {
     pub torn_pixels: u32,
     /// Coverage tests made for them.
     pub coverage_tests: u32,
+}
+
+/// Where a pixel comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct Probe {
+    /// The label of the sheet that shows.
+    pub label: u8,
+    /// Its position in the source image.
+    pub at: PlayUv,
 }
 
 /// Plays one bundle from memory that the caller owns.
@@ -142,38 +153,32 @@ impl<'a> Player<'a> {
     /// At most one texel read and one coverage test a pixel and sheet of its cell; never allocates, never waits.
     /// The first row of a row of cells also interpolates the layers of two rows of nodes.
     pub fn row(&mut self, y: u32, out: &mut [u16]) {
-        let (width, height) = self.bundle.size();
-        if y >= height {
+        let texture = self.bundle.texture();
+        if !self.ready(y) {
             return;
         }
-        let grid = self.bundle.grid();
-        let row = (y >> grid.log2) as usize;
-        if self.loaded != Some(row) {
+        let Ok(palette) = <&[u16; 256]>::try_from(&*self.space.palette) else { return };
+        let drawing = Drawing { bundle: self.bundle, rows: &self.space.rows, sheets: &self.space.sheets };
+        drawing.row(y, out, &mut self.work, |uv, _| palette.get(usize::from(texture.texel(uv))).copied().unwrap_or(0));
+    }
+
+    /// Like [`Player::row`], but says where each pixel comes from instead of its colour.
+    pub fn probe_row(&mut self, y: u32, out: &mut [Probe]) {
+        if !self.ready(y) {
+            return;
+        }
+        let drawing = Drawing { bundle: self.bundle, rows: &self.space.rows, sheets: &self.space.sheets };
+        drawing.row(y, out, &mut self.work, |at, label| Probe { label, at });
+    }
+
+    /// Loads the row of cells that row `y` is in; false below the screen.
+    fn ready(&mut self, y: u32) -> bool {
+        let row = (y >> self.bundle.grid().log2) as usize;
+        let inside = y < self.bundle.size().1;
+        if inside && self.loaded != Some(row) {
             self.load(row);
         }
-        let step = y & (1u32 << grid.log2).wrapping_sub(1);
-        let Ok(palette) = <&[u16; 256]>::try_from(&*self.space.palette) else { return };
-        let paint = Paint { texture: self.bundle.texture(), palette };
-        let [top, bottom] = &self.space.rows;
-        let drawn = out.len().min(width as usize);
-        let out = out.get_mut(..drawn).unwrap_or(&mut []);
-        for (column, pixels) in out.chunks_mut(1 << grid.log2).enumerate() {
-            let Some((back, front)) = self.space.sheets.cell(column).split_last() else {
-                // Only a broken bundle has a cell without sheets.
-                pixels.fill(0);
-                continue;
-            };
-            let count = pixels.len() as u32;
-            paint.all(pixels, back.span(top, bottom, step, grid.log2));
-            // Back to front: the frontmost sheet that covers a pixel has the last word.
-            for sheet in front.iter().rev() {
-                let chart = Chart::new(&self.bundle.label(sheet.label()));
-                paint.covered(pixels, sheet.span(top, bottom, step, grid.log2), &chart);
-                self.work.coverage_tests = self.work.coverage_tests.wrapping_add(count);
-            }
-            let kind = if front.is_empty() { &mut self.work.smooth_pixels } else { &mut self.work.torn_pixels };
-            *kind = kind.wrapping_add(count);
-        }
+        inside
     }
 
     /// Interpolates the nodes around a row of cells and looks up its sheets.
@@ -187,7 +192,7 @@ impl<'a> Player<'a> {
         else {
             return;
         };
-        let mut fill = |nodes: &mut crate::cell::NodeRow<'_>, row: usize| {
+        let mut fill = |nodes: &mut NodeRow<'_>, row: usize| {
             let layers = nodes.fill(grid, row, [a, b], self.moment.weight, &texture);
             self.work.layers = self.work.layers.wrapping_add(layers);
         };
@@ -217,5 +222,42 @@ impl<'a> Player<'a> {
         self.space.stream.code(&mut Decoder::new(bundle.record(index)), shape, place, &mut Nothing);
         self.last = Some((position, place.run));
         self.work.keys = self.work.keys.wrapping_add(1);
+    }
+}
+
+/// A loaded row of cells, ready to be drawn.
+struct Drawing<'d, 'a> {
+    bundle: &'d Bundle<'a>,
+    rows: &'d [NodeRow<'a>; 2],
+    sheets: &'d RowSheets<'a>,
+}
+
+impl Drawing<'_, '_> {
+    /// Draws pixel row `y`, which lies in the loaded row of cells; `make` turns a position and its label into a pixel.
+    #[inline(always)]
+    fn row<T: Default>(&self, y: u32, out: &mut [T], work: &mut Work, make: impl Fn(PlayUv, u8) -> T) {
+        let log2 = self.bundle.grid().log2;
+        let step = y & (1u32 << log2).wrapping_sub(1);
+        let texture = self.bundle.texture();
+        let [top, bottom] = self.rows;
+        let drawn = out.len().min(self.bundle.size().0 as usize);
+        let out = out.get_mut(..drawn).unwrap_or(&mut []);
+        for (column, pixels) in out.chunks_mut(1 << log2).enumerate() {
+            let Some((back, front)) = self.sheets.cell(column).split_last() else {
+                // Only a broken bundle has a cell without sheets.
+                pixels.fill_with(T::default);
+                continue;
+            };
+            let count = pixels.len() as u32;
+            span::all(pixels, back.span(top, bottom, step, log2), |uv| make(uv, back.label()));
+            // Back to front: the frontmost sheet that covers a pixel has the last word.
+            for sheet in front.iter().rev() {
+                let chart = Chart::new(&self.bundle.label(sheet.label()));
+                span::covered(pixels, sheet.span(top, bottom, step, log2), &chart, &texture, |uv| make(uv, sheet.label()));
+                work.coverage_tests = work.coverage_tests.wrapping_add(count);
+            }
+            let kind = if front.is_empty() { &mut work.smooth_pixels } else { &mut work.torn_pixels };
+            *kind = kind.wrapping_add(count);
+        }
     }
 }

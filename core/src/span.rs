@@ -36,37 +36,24 @@ impl PlayUv {
     }
 }
 
-/// What pixels are made from.
-#[derive(Clone, Copy, Debug)]
-pub struct Paint<'a> {
-    /// The source image.
-    pub texture: Texture<'a>,
-    /// RGB565 in the byte order wanted.
-    pub palette: &'a [u16; 256],
+/// Paints every pixel of `out`; `make` turns a position into a pixel.
+#[inline(always)]
+pub fn all<T>(out: &mut [T], span: Span, make: impl Fn(PlayUv) -> T) {
+    let mut uv = span.from;
+    for pixel in out {
+        *pixel = make(uv);
+        uv = uv.plus(span.step);
+    }
 }
 
-impl Paint<'_> {
-    fn colour(&self, uv: PlayUv) -> u16 {
-        self.palette.get(usize::from(self.texture.texel(uv))).copied().unwrap_or(0)
-    }
-
-    /// Paints every pixel of `out`.
-    pub fn all(&self, out: &mut [u16], span: Span) {
-        let mut uv = span.from;
-        for pixel in out {
-            *pixel = self.colour(uv);
-            uv = uv.plus(span.step);
+/// Paints the pixels of `out` at which `chart` covers the span.
+#[inline(always)]
+pub fn covered<T>(out: &mut [T], span: Span, chart: &Chart, texture: &Texture<'_>, make: impl Fn(PlayUv) -> T) {
+    let mut uv = span.from;
+    for pixel in out {
+        if chart.covers(uv, texture) {
+            *pixel = make(uv);
         }
-    }
-
-    /// Paints the pixels of `out` at which `chart` covers the span.
-    pub fn covered(&self, out: &mut [u16], span: Span, chart: &Chart) {
-        let mut uv = span.from;
-        for pixel in out {
-            if chart.covers(uv, &self.texture) {
-                *pixel = self.colour(uv);
-            }
-            uv = uv.plus(span.step);
-        }
+        uv = uv.plus(span.step);
     }
 }

@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use thiserror::Error;
 
 /// The most labels a source image has, the background included.
-pub const MAX_LABELS: usize = 4096;
+pub const MAX_LABELS: usize = 256;
 /// Labels beyond this are avoided by sharing them.
 const WANTED_LABELS: usize = 255;
 /// How far inside its label's rectangle a coordinate stays, texels.

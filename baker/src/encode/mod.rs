@@ -115,8 +115,10 @@ fn label_record(label: &crate::atlas::Label) -> LabelRecord {
     let mut record = LabelRecord { left, top, right, bottom, flags: if label.masked { MASKED } else { 0 }, ..LabelRecord::default() };
     if let Some(fixed) = &label.fixed {
         record.flags = FIXED;
-        (record.origin_u, record.origin_v) = (scaled(fixed.origin[0], KEY_BITS), scaled(fixed.origin[1], KEY_BITS));
-        (record.step_u, record.step_v) = (scaled(fixed.step[0], 14), scaled(fixed.step[1], 14));
+        // Nodes stand at pixel centres.
+        let [u, v] = [0, 1].map(|axis| f64::from(fixed.origin[axis]) + 0.5 * f64::from(fixed.step[axis]));
+        (record.origin_u, record.origin_v) = (scaled(u, KEY_BITS), scaled(v, KEY_BITS));
+        (record.step_u, record.step_v) = (scaled(f64::from(fixed.step[0]), 14), scaled(f64::from(fixed.step[1]), 14));
     }
     record
 }

@@ -1,0 +1,136 @@
+//! The whole line: a scene in, a bundle out.
+//! The stages are the crate's modules; this runs them in order, times them, and reports progress.
+
+use crate::atlas::{self, Atlas, AtlasError};
+use crate::encode::{self, CodingSettings};
+use crate::gbuffer::Hits;
+use crate::scene::Scene;
+use crate::sheets::{self, KeyGrid, Layers};
+use crate::trace::Tracer;
+use crate::{fit, order};
+use std::time::Instant;
+use thiserror::Error;
+
+/// Hears the name of the stage and how much of it is done, 0..=1.
+pub type Progress<'a> = &'a (dyn Fn(&str, f64) + Sync);
+
+/// Why a scene cannot be baked.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum BakeError {
+    /// The cell is not one the player knows.
+    #[error("--cell: expected 4, 8, 16 or 32 pixels, found {0}")]
+    Cell(u32),
+    /// The key interval is out of range.
+    #[error("--key-interval: expected 1 to 256 frames, found {0}")]
+    KeyInterval(u32),
+    /// There is no source image.
+    #[error(transparent)]
+    Atlas(#[from] AtlasError),
+    /// The scene is more than a bundle can hold.
+    #[error("{what}: {found}, but a bundle holds at most {most}; {cure}")]
+    Limit {
+        /// What there is too much of.
+        what: &'static str,
+        /// How much there is.
+        found: usize,
+        /// How much there can be.
+        most: usize,
+        /// What to do about it.
+        cure: &'static str,
+    },
+}
+
+/// What may be chosen about a bundle.
+#[derive(Clone, Copy, Debug)]
+pub struct Settings {
+    /// Side of a cell, pixels: 4, 8, 16 or 32.
+    pub cell: u32,
+    /// Frames between keys.
+    pub key_interval: u32,
+    /// The source image.
+    pub atlas: atlas::Settings,
+    /// The keys.
+    pub coding: CodingSettings,
+    /// A label seen in fewer pixels of a cell and interval is left out of it.
+    pub least_pixels: u32,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            cell: 8,
+            key_interval: 8,
+            atlas: atlas::Settings::default(),
+            coding: CodingSettings { step_log2: 1, lambda: 0.05, independent_every: 16 },
+            least_pixels: 4,
+        }
+    }
+}
+
+/// What the camera sees, flattened: everything before the key-ray grid.
+pub struct Flat {
+    /// The source image and the G-buffer in it.
+    pub atlas: Atlas,
+    /// Rays cast.
+    pub rays: u64,
+    /// Seconds the rays took.
+    pub ray_seconds: f64,
+    /// Seconds the source image took.
+    pub atlas_seconds: f64,
+}
+
+/// A bundle and how it came about.
+pub struct Encoded {
+    /// The bundle's bytes.
+    pub bundle: Vec<u8>,
+    /// The key-ray grid.
+    pub grid: KeyGrid,
+    /// Pixels whose sheet was too small to keep.
+    pub dropped_pixels: u64,
+    /// Seconds for sheets, fit and coding.
+    pub seconds: f64,
+}
+
+/// Casts the rays and makes the source image.
+///
+/// # Errors
+/// [`BakeError`] where the settings are out of range or the charts do not fit.
+pub fn flatten(scene: &Scene, settings: &atlas::Settings, progress: Progress<'_>) -> Result<Flat, BakeError> {
+    let part = |done: u64, total: u64| done as f64 / total.max(1) as f64;
+    let start = Instant::now();
+    progress("building the hierarchy", 0.0);
+    let tracer = Tracer::new(scene);
+    let hits = Hits::cast(scene, &tracer, &|done, total| progress("casting rays", part(done, total)));
+    let ray_seconds = start.elapsed().as_secs_f64();
+    let start = Instant::now();
+    let atlas = atlas::build(scene, &hits, settings, &|done, total| progress("flattening surfaces", part(done, total)))?;
+    Ok(Flat { rays: hits.samples.len() as u64, atlas, ray_seconds, atlas_seconds: start.elapsed().as_secs_f64() })
+}
+
+/// Fits and codes the keys, and puts the bundle together.
+///
+/// # Errors
+/// [`BakeError`] where the settings are out of range or the scene exceeds what a bundle holds.
+pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progress<'_>) -> Result<Encoded, BakeError> {
+    if !matches!(settings.cell, 4 | 8 | 16 | 32) {
+        return Err(BakeError::Cell(settings.cell));
+    }
+    if !(1..=256).contains(&settings.key_interval) {
+        return Err(BakeError::KeyInterval(settings.key_interval));
+    }
+    let start = Instant::now();
+    let Atlas { image, gbuffer, .. } = &flat.atlas;
+    let grid = KeyGrid::new(gbuffer, settings.cell.trailing_zeros() as u8, settings.key_interval, scene.playback.looping);
+    progress("finding sheets", 0.0);
+    let mut sheets = sheets::find(gbuffer, &grid, settings.least_pixels);
+    let layers = Layers::of(&grid, &sheets);
+    progress("fitting keys", 0.2);
+    let fit = fit::solve(gbuffer, &grid, &sheets, &layers);
+    progress("ordering sheets", 0.7);
+    order::sort(gbuffer, &grid, image, &layers, &fit, &mut sheets);
+    progress("coding keys", 0.8);
+    let header = encode::Frame { fps: scene.playback.fps, info: &scene.name };
+    let bundle = encode::bundle(gbuffer, &grid, image, &sheets, &layers, &fit, settings.coding, header);
+    progress("coding keys", 1.0);
+    Ok(Encoded { bundle, grid, dropped_pixels: sheets.dropped, seconds: start.elapsed().as_secs_f64() })
+}
