@@ -1,6 +1,8 @@
 //! A scene in memory: world-space triangles, materials, textures, lights, a camera path, playback.
 //! Every loader ends here; everything after it starts here.
 
+pub mod builtin;
+
 use crate::camera::Path;
 use glam::{DVec3, Vec2, Vec3};
 use std::sync::Arc;
