@@ -1,6 +1,21 @@
 //! A scene in memory: world-space triangles, materials, textures, lights, a camera path, playback.
 //! Every loader ends here; everything after it starts here.
 
+pub mod builtin;
+mod error;
+mod file;
+mod gltf;
+mod heightfield;
+mod keys;
+mod load;
+mod model;
+mod obj;
+mod picture;
+mod ply;
+
+pub use error::SceneError;
+pub use load::{Overrides, load, load_builtin};
+
 use crate::camera::Path;
 use glam::{DVec3, Vec2, Vec3};
 use std::sync::Arc;
