@@ -149,3 +149,18 @@ pub struct Scene {
     /// What the loader wants the user to know.
     pub warnings: Vec<String>,
 }
+
+impl std::fmt::Debug for Scene {
+    /// Counts, not contents: a scene has millions of numbers.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Scene")
+            .field("name", &self.name)
+            .field("triangles", &self.triangles.len())
+            .field("materials", &self.materials.len())
+            .field("textures", &self.textures.len())
+            .field("lights", &self.lights)
+            .field("playback", &self.playback)
+            .field("warnings", &self.warnings)
+            .finish_non_exhaustive()
+    }
+}

@@ -51,6 +51,9 @@ fn model(text: &str, folder: &Path, fallback: Option<&Path>) -> Result<Model, St
         }
     }
     model.textures = textures.all;
+    if !model.textures.is_empty() && objects.iter().all(|o| o.mesh.texcoords.len() <= 2) {
+        model.warnings.add("there are textures but no texture coordinates: they show their first texel only");
+    }
     for object in &objects {
         append(&object.mesh, plain, &mut model);
     }
@@ -60,6 +63,8 @@ fn model(text: &str, folder: &Path, fallback: Option<&Path>) -> Result<Model, St
 /// Checks every line that matters and hands back a text that `tobj` takes as it is meant: lines joined, extras dropped.
 fn check(text: &str, warnings: &mut Warnings) -> Result<String, String> {
     let mut clean = String::with_capacity(text.len());
+    // Number 1 of each stands for "none": left to itself, `tobj` gives such corners the ones of the corner before.
+    clean.push_str("vt 0 1\nvn 0 0 0\n");
     let (mut vertices, mut coloured, mut uvs, mut normals, mut triangles) = (0i64, 0i64, 0i64, 0i64, 0usize);
     let mut lines = text.lines().enumerate();
     // Forward references are allowed: absolute indices are held against the whole file at the end.
@@ -105,29 +110,24 @@ fn check(text: &str, warnings: &mut Warnings) -> Result<String, String> {
                 clean.push('f');
                 for corner in rest.split_whitespace() {
                     corners += 1;
-                    clean.push(' ');
+                    let mut parsed = [0i64; 3];
                     for (i, part) in corner.split('/').enumerate() {
-                        let (what, count) = [("vertices", vertices), ("texture coordinates", uvs), ("normals", normals)]
-                            .get(i)
-                            .copied()
-                            .ok_or_else(|| format!("line {place}: \"{corner}\"; expected v, v/vt, v//vn or v/vt/vn"))?;
-                        if i > 0 {
-                            clean.push('/');
-                        }
+                        let odd = || format!("line {place}: \"{corner}\"; expected v, v/vt, v//vn or v/vt/vn");
+                        let (what, count) =
+                            [("vertices", vertices), ("texture coordinates", uvs), ("normals", normals)].get(i).copied().ok_or_else(odd)?;
                         if part.is_empty() && i > 0 {
                             continue;
                         }
-                        let index: i64 =
-                            part.parse().map_err(|_| format!("line {place}: \"{corner}\"; expected v, v/vt, v//vn or v/vt/vn"))?;
+                        let index: i64 = part.parse().map_err(|_| odd())?;
                         if index == 0 || index < -count {
                             return Err(format!("line {place}: index {index} of {count} {what} so far"));
                         }
-                        let index = if index < 0 { count + 1 + index } else { index };
-                        if index > highest[i].0 {
-                            highest[i] = (index, place);
+                        parsed[i] = if index < 0 { count + 1 + index } else { index };
+                        if parsed[i] > highest[i].0 {
+                            highest[i] = (parsed[i], place);
                         }
-                        clean.push_str(&index.to_string());
                     }
+                    clean.push_str(&format!(" {}/{}/{}", parsed[0], parsed[1].saturating_add(1), parsed[2].saturating_add(1)));
                 }
                 if corners < 3 {
                     return Err(format!("line {place}: a face of {corners} corners; expected at least 3"));
@@ -326,6 +326,6 @@ mod tests {
         assert!(check("v 0 0 0\nf 1/x 1 1\n").unwrap_err().starts_with("line 2: \"1/x\""));
         assert!(check("v 0 nan 0\n").unwrap_err().starts_with("line 1"));
         assert!(check("v 0 0 0\nf -1 -2 -1\n").unwrap_err().contains("index -2 of 1 vertices so far"));
-        assert_eq!(check("v 0 0 0 1 # w\nv 1 0 \\\n0\nf 1 2 -1\n").unwrap(), "v 0 0 0\nv 1 0 0\nf 1 2 2\n");
+        assert_eq!(check("v 0 0 0 1 # w\nv 1 0 \\\n0\nf 1 2 -1\n").unwrap(), "vt 0 1\nvn 0 0 0\nv 0 0 0\nv 1 0 0\nf 1/1/1 2/1/1 2/1/1\n");
     }
 }
