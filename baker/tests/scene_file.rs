@@ -68,6 +68,8 @@ fn every_kind_of_path() {
     let pivot = path("pivot = { eye = [0, 2, 0], azimuth = [0, 90] }\nup = [1, 0, 0]");
     assert_eq!((pivot.pose(0.0).forward, pivot.pose(0.0).up), (DVec3::Z, DVec3::X));
     assert_eq!(path("fov = 30").pose(0.0).fov, 30.0);
+    let dark = scene("[scene]\nmodel = \"a.obj\"\n").unwrap();
+    assert!(dark.warnings.iter().any(|w| w.contains("no light")), "{:?}", dark.warnings);
 }
 
 #[test]

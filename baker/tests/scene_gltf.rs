@@ -3,6 +3,7 @@
 use cubist_baker::scene::{Overrides, Scene, SceneError, Wrap, load};
 use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
+use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_4};
 use std::path::Path;
 
 /// A document under construction: binary chunk, buffer views and accessors.
@@ -67,7 +68,7 @@ impl Builder {
     }
 
     fn error(&self) -> String {
-        self.load().err().expect("a broken file loads").to_string()
+        self.load().expect_err("a broken file loads").to_string()
     }
 }
 
@@ -211,7 +212,7 @@ fn instances_sparse_accessors_and_quantised_positions() {
     b.push("meshes", json!({ "primitives": [{ "attributes": { "POSITION": 0 }, "mode": 6 }] }));
     b.push("nodes", json!({ "children": [1, 2], "translation": [10, 0, 0] }));
     b.push("nodes", json!({ "mesh": 0, "scale": [2, 2, 2] }));
-    b.push("nodes", json!({ "mesh": 0, "rotation": [0, 0.7071067811865476, 0, 0.7071067811865476] }));
+    b.push("nodes", json!({ "mesh": 0, "rotation": [0, FRAC_1_SQRT_2, 0, FRAC_1_SQRT_2] }));
     let scene = b.load().unwrap();
     assert_eq!(scene.triangles.len(), 4);
     let near = |a: DVec3, b: [f64; 3]| assert!((a - DVec3::from_array(b)).length() < 1e-6, "{a} is not {b:?}");
@@ -248,7 +249,7 @@ fn a_camera_follows_its_animated_parent_through_a_scene_file() {
     let times = b.floats(&[1.0, 3.0], "SCALAR", 1);
     let places = b.floats(&[0.0, 0.0, 4.0, 8.0, 0.0, 4.0], "VEC3", 3);
     b.json["scenes"][0]["nodes"] = json!([0, 1]);
-    b.push("cameras", json!({ "name": "Flight", "type": "perspective", "perspective": { "yfov": 0.7853981633974483, "znear": 0.1 } }));
+    b.push("cameras", json!({ "name": "Flight", "type": "perspective", "perspective": { "yfov": FRAC_PI_4, "znear": 0.1 } }));
     b.push("nodes", json!({ "name": "Rig", "children": [2] }));
     b.push("nodes", json!({ "name": "Lens", "camera": 0, "translation": [0, 1, 0] }));
     b.push("animations", json!({ "channels": [
@@ -308,6 +309,11 @@ fn every_kind_of_damage_is_an_error_that_says_so() {
     bad(&|b| b.bin[16..20].copy_from_slice(&f32::NAN.to_le_bytes()), "position 1 is");
     bad(&|b| b.list("accessors")[0]["count"] = json!(5), "accessor 0: 5 elements need 60 bytes");
     bad(&|b| b.list("accessors")[0]["count"] = json!(u64::MAX), "accessor 0: count");
+    bad(&|b| b.json["accessors"][0] = json!({ "componentType": 5126, "type": "VEC3", "count": 40_000_000 }), "accessor 0: count");
+    bad(
+        &|b| b.json["accessors"][1] = json!({ "bufferView": 0, "componentType": 5126, "type": "SCALAR", "count": 3 }),
+        "indices: componentType",
+    );
     bad(&|b| b.list("accessors")[0]["byteOffset"] = json!(u64::MAX), "accessor 0");
     bad(&|b| b.list("accessors")[0]["type"] = json!("VEC2"), "expected [Vec3]");
     bad(&|b| b.list("accessors")[0]["componentType"] = json!(7), "unknown type or componentType");

@@ -62,13 +62,20 @@ pub enum SceneError {
     },
 }
 
+/// How many warnings are kept.
+const MAX_WARNINGS: usize = 100;
+
 /// What a loader approximated or ignored, each thing once, in the order found.
 #[derive(Debug, Default)]
 pub(crate) struct Warnings(Vec<String>);
 
 impl Warnings {
     pub(crate) fn add(&mut self, text: impl Into<String>) {
-        let text = text.into();
+        // A damaged file can give cause for millions; nobody reads on after a hundred.
+        if self.0.len() > MAX_WARNINGS {
+            return;
+        }
+        let text = if self.0.len() == MAX_WARNINGS { "further warnings are left out".to_owned() } else { text.into() };
         if !self.0.contains(&text) {
             self.0.push(text);
         }

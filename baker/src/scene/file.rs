@@ -5,7 +5,7 @@ use super::error::{SceneError, Warnings};
 use super::keys::{CameraTable, File, HeightTable, LightTable, Source};
 use super::load::{self, BACKGROUND, FOV, MAX_FPS, MAX_FRAMES, MAX_SCREEN, Overrides, PLAYBACK};
 use super::model::{Model, shared};
-use super::{Background, Light, Playback, Scene, Wrap, heightfield, picture};
+use super::{Background, Light, Playback, Scene, Triangle, Wrap, heightfield, picture};
 use crate::camera::{self, Aim, Line, Orbit, Pivot, Spline};
 use glam::{DVec3, Vec3};
 use std::path::{Path, PathBuf};
@@ -39,6 +39,11 @@ pub(crate) fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneErr
     };
     if file.camera.as_ref().is_some_and(|c| c.gltf.is_some() && c.up.is_some()) {
         model.warnings.add("camera.up is ignored: the model's camera has its own");
+    }
+    let colour = |t: &Triangle| model.materials.get(t.material as usize).map(|m| m.colour);
+    let plain = model.textures.is_empty() && !model.coloured && model.triangles.windows(2).all(|t| colour(&t[0]) == colour(&t[1]));
+    if lights.is_empty() && plain {
+        model.warnings.add("one colour and no light: only the outline will show; add a [[light]]");
     }
     let background = background(&source, &file, &mut model.warnings)?.unwrap_or(Background::Colour(BACKGROUND));
     Ok(Scene {

@@ -6,8 +6,10 @@ use ::gltf::json::Root;
 use ::gltf::json::accessor::{ComponentType, Type};
 use ::gltf::json::validation::Checked;
 
-/// No accessor may hold more numbers: a few bytes of JSON can promise billions of zeros.
+/// No accessor may hold more numbers.
 const MAX_NUMBERS: u64 = 1 << 27;
+/// Nor more of them without bytes in the file: a line of JSON can promise billions of zeros.
+const MAX_ZEROS: u64 = 1 << 25;
 
 /// The numbers of an accessor, element after element.
 #[derive(Debug)]
@@ -73,6 +75,17 @@ impl Format {
 }
 
 impl Data<'_> {
+    /// Reads accessor `index` as whole numbers from 0 up: vertex indices.
+    pub fn read_indices(&self, index: usize) -> Result<Numbers, String> {
+        let component = self.root.accessors.get(index).map(|a| a.component_type);
+        match component {
+            Some(Checked::Valid(c)) if !matches!(c.0, ComponentType::U8 | ComponentType::U16 | ComponentType::U32) => {
+                Err(format!("componentType {:?}; expected U8, U16 or U32", c.0))
+            }
+            _ => self.read(index, &[Type::Scalar]),
+        }
+    }
+
     /// Reads accessor `index`, whose elements must be of one of `shapes`.
     pub fn read(&self, index: usize, shapes: &[Type]) -> Result<Numbers, String> {
         self.read_inner(index, shapes).map_err(|e| format!("accessor {index}: {e}"))
@@ -89,8 +102,9 @@ impl Data<'_> {
         }
         let format = Format { component: component.0, normalized: accessor.normalized };
         let (width, total) = (shape.multiplicity(), accessor.count.0);
-        if total.saturating_mul(width as u64) > MAX_NUMBERS {
-            return Err(format!("count {total}: at most {MAX_NUMBERS} numbers are taken"));
+        let most = if accessor.buffer_view.is_some() { MAX_NUMBERS } else { MAX_ZEROS };
+        if total.saturating_mul(width as u64) > most {
+            return Err(format!("count {total}: at most {most} numbers are taken: split the mesh"));
         }
         let count = total as usize;
         let mut values = match accessor.buffer_view {

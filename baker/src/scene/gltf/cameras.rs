@@ -39,7 +39,7 @@ fn path(node: usize, nodes: &Nodes, fov: f64) -> Animated {
     let mut range: Option<[f64; 2]> = None;
     let mut at = Some(node);
     // Only nodes of the scene: those are known to form a tree.
-    while let Some(n) = at.filter(|n| chain.len() <= nodes.order.len() && nodes.order.contains(n)) {
+    while let Some(n) = at.filter(|&n| nodes.shown[n] && chain.len() < nodes.order.len()) {
         chain.push(nodes.links[n].clone());
         if let Some([first, last]) = nodes.ranges[n] {
             let [low, high] = range.unwrap_or([first, last]);

@@ -58,7 +58,6 @@ pub(crate) fn parse(bytes: &[u8], warnings: &mut Warnings) -> Result<Shell, Stri
             warnings.add(format!("texture {i} has no PNG or JPEG picture: drawn without it"));
         }
     }
-    // Any node may carry extras of any size; nothing here reads them.
     let root = serde_json::from_value(value).map_err(|e| format!("not a valid glTF 2.0 document: {e}"))?;
     Ok(Shell { root, blob, animated_cameras })
 }

@@ -162,7 +162,7 @@ fn read(
     }
     let indices = match p.indices {
         Some(a) => {
-            let n = data.read(a.value(), &[Type::Scalar]).map_err(|e| format!("indices: {e}"))?;
+            let n = data.read_indices(a.value()).map_err(|e| format!("indices: {e}"))?;
             if let Some(bad) = n.values.iter().find(|v| !(**v >= 0.0 && **v < count as f64)) {
                 return Err(format!("index {bad} of {count} vertices"));
             }

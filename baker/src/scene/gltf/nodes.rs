@@ -18,6 +18,8 @@ pub(crate) struct Nodes {
     pub parents: Vec<Option<usize>>,
     /// The nodes of the scene, parents before children.
     pub order: Vec<usize>,
+    /// Whether a node is in the scene.
+    pub shown: Vec<bool>,
     /// World transforms at rest; identity for nodes that are not in the scene.
     pub rest: Vec<DMat4>,
     /// World transforms with every animated property at its first key.
@@ -41,8 +43,10 @@ pub(crate) fn load(data: Data<'_>, warnings: &mut Warnings) -> Result<Nodes, Str
             }
         }
     }
+    let (order, shown) = order(data, &parents, warnings)?;
     let mut nodes = Nodes {
-        order: order(data, &parents, warnings)?,
+        order,
+        shown,
         parents,
         rest: vec![DMat4::IDENTITY; count],
         posed: vec![DMat4::IDENTITY; count],
@@ -66,7 +70,7 @@ pub(crate) fn name(data: Data<'_>, i: usize) -> String {
     }
 }
 
-fn order(data: Data<'_>, parents: &[Option<usize>], warnings: &mut Warnings) -> Result<Vec<usize>, String> {
+fn order(data: Data<'_>, parents: &[Option<usize>], warnings: &mut Warnings) -> Result<(Vec<usize>, Vec<bool>), String> {
     let root = data.root;
     let roots: Vec<usize> = if root.scenes.is_empty() {
         (0..parents.len()).filter(|&i| parents[i].is_none()).collect()
@@ -95,7 +99,7 @@ fn order(data: Data<'_>, parents: &[Option<usize>], warnings: &mut Warnings) -> 
     if let Some(&i) = order.iter().find(|&&i| parents[i].is_some_and(|p| !seen[p])) {
         warnings.add(format!("{} is a root of the scene and another node's child: its parent's transform is not used", name(data, i)));
     }
-    Ok(order)
+    Ok((order, seen))
 }
 
 fn link(node: &json::Node) -> Link {
