@@ -63,6 +63,36 @@ pub const fn part(from: i32, to: i32, step: u32, log2: u32) -> i32 {
     (from as i64 + (((to as i64 - from as i64) * step as i64) >> log2)) as i32
 }
 
+/// The largest field code: 128 pixels.
+pub const MAX_FIELD: i32 = 37;
+
+/// The distance that field code `code` stands for, Q8 pixels: four steps an octave from 1/4 pixel, with a sign; 0 is 0.
+#[must_use]
+pub fn field_distance(code: i8) -> i32 {
+    // 64 * 2^(i / 4).
+    const STEPS: [i32; 4] = [64, 76, 91, 108];
+    let size = u32::from(code.unsigned_abs()).min(MAX_FIELD as u32);
+    let Some(index) = size.checked_sub(1) else { return 0 };
+    let distance = STEPS.get(index as usize & 3).copied().unwrap_or(0).wrapping_shl(index >> 2);
+    if code < 0 { distance.wrapping_neg() } else { distance }
+}
+
+/// The field code closest to `distance`, Q8 pixels.
+#[must_use]
+pub fn field_code(distance: i32) -> i8 {
+    let size = distance.unsigned_abs().min(1 << 20) as i32;
+    let mut code = 0i8;
+    // The codes' distances grow: stop at the first whose midpoint to the next is not passed.
+    while i32::from(code) < MAX_FIELD {
+        let (low, high) = (field_distance(code), field_distance(code.wrapping_add(1)));
+        if size.wrapping_mul(2) < low.wrapping_add(high) {
+            break;
+        }
+        code = code.wrapping_add(1);
+    }
+    if distance < 0 { code.wrapping_neg() } else { code }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -72,6 +102,15 @@ mod tests {
         assert_eq!(blend([1, 65_535, 3, 4], [0, ONE, 0, 0]), 65_535 << 10);
         assert_eq!(blend([1, 2, 65_535, 4], [0, 0, ONE, 0]), 65_535 << 10);
         assert_eq!(blend([1234; 4], [-700, ONE - 300, 1700, -700]), 1234 << 10);
+    }
+
+    #[test]
+    fn field_codes_come_back() {
+        for code in -37..=37i8 {
+            assert_eq!(field_code(field_distance(code)), code);
+        }
+        assert_eq!(field_distance(37), 128 << 8);
+        assert_eq!((field_code(1 << 30), field_code(-(1 << 30)), field_code(20)), (37, -37, 0));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 
 use crate::Bundle;
 use crate::fixed::{ONE, WEIGHT_BITS};
-use crate::format::{KeyEntry, TIME_CUBIC, TIME_HOLD};
+use crate::format::{KeyEntry, TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
 use crate::record::Place;
 
 /// The weights (Q14, summing to one) of four keys: the one before the interval, its two ends, the one after.
@@ -19,6 +19,8 @@ pub struct Moment {
     pub interval: usize,
     /// The weights of the keys around it.
     pub weights: WeightSet,
+    /// How far it is to the end of the interval, Q14.
+    pub linear: i32,
 }
 
 /// How many keys before an interval's first and after its first one are needed to play it.
@@ -94,7 +96,10 @@ impl Bundle<'_> {
         let interval = after.saturating_sub(1).min(self.intervals().saturating_sub(1));
         let at = interval as isize;
         let lengths = [self.interval_length(at.wrapping_sub(1)), self.interval_length(at), self.interval_length(at.wrapping_add(1))];
-        Moment { interval, weights: weights(self.path().time, lengths, frame.saturating_sub(self.interval_start(interval))) }
+        let passed = frame.saturating_sub(self.interval_start(interval));
+        let time = self.path().time;
+        let [[_, _, linear, _], ..] = weights(time.min(TIME_LINEAR), lengths, passed);
+        Moment { interval, weights: weights(time, lengths, passed), linear }
     }
 
     /// The place of key `key`'s record, `run` records after the last independent one.
@@ -114,7 +119,6 @@ impl Bundle<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::format::TIME_LINEAR;
 
     #[test]
     fn weights_sum_to_one_and_are_exact_at_both_keys() {
