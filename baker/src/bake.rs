@@ -67,7 +67,7 @@ impl Default for Settings {
             key_interval: 8,
             time: TIME_CUBIC,
             atlas: atlas::Settings::default(),
-            coding: CodingSettings { step_log2: 1, lambda: 0.05, independent_every: 16 },
+            coding: CodingSettings { step_log2: 0, lambda: 0.05, independent_every: 16 },
             least_pixels: 4,
             field_price: 4,
         }

@@ -1,7 +1,6 @@
 //! A row of cells at one moment: every node's layers interpolated in time, every cell's sheets with
 //! their four corners. Keys and lists come from the caller's memory, spans go to `span`.
 
-use crate::atlas::Texture;
 use crate::fixed::{KeyUv, ONE, PlayUv, WEIGHT_BITS, blend, part};
 use crate::grid::Grid;
 use crate::key::Key;
@@ -75,7 +74,7 @@ pub struct NodeRow<'m> {
 
 impl NodeRow<'_> {
     /// Fills the row with the layers that both ends of the interval carry, weighted. Returns how many there are.
-    pub fn fill(&mut self, grid: Grid, row: usize, keys: &Around<'_, '_>, moment: &Moment, texture: &Texture<'_>) -> u32 {
+    pub fn fill(&mut self, grid: Grid, row: usize, keys: &Around<'_, '_>, moment: &Moment) -> u32 {
         let (weights, linear) = (&moment.weights, moment.linear);
         let first = row.wrapping_mul(grid.node_columns());
         let mut count = 0usize;
@@ -89,7 +88,7 @@ impl NodeRow<'_> {
                 if let Some(other) = keys.to.find(node, label)
                     && let Some((slot, layer)) = self.label.get_mut(count).zip(self.layer.get_mut(count))
                 {
-                    let uv = texture.clamp(keys.blend(node, label, [index, other], weights));
+                    let uv = keys.blend(node, label, [index, other], weights);
                     *slot = label;
                     *layer = Layer { u: uv.u, v: uv.v };
                     if let Some(field) = self.field.get_mut(count) {

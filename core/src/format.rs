@@ -91,9 +91,9 @@ pub struct LabelRecord {
     pub flags: u8,
     /// Room for a tint; 0: none.
     pub tint: [u8; 3],
-    /// [`FIXED`] labels: u at the screen's left edge, 1/64 texel.
+    /// [`FIXED`] labels: u at the screen's left edge, 1/32 texel.
     pub origin_u: u16,
-    /// [`FIXED`] labels: v at the screen's top edge, 1/64 texel.
+    /// [`FIXED`] labels: v at the screen's top edge, 1/32 texel.
     pub origin_v: u16,
     /// [`FIXED`] labels: u a pixel to the right, 1/16384 texel.
     pub step_u: u16,
@@ -160,7 +160,7 @@ pub struct Path<'a> {
     pub cell_log2: u8,
     /// [`TIME_HOLD`], [`TIME_LINEAR`] or [`TIME_CUBIC`].
     pub time: u8,
-    /// Coordinates are coded in steps of 2^this / 64 texel, 0..=4.
+    /// Coordinates are coded in steps of 2^this / 32 texel, 0..=4.
     pub step_log2: u8,
     /// The bounds that memory and work follow from.
     pub limits: Limits,

@@ -81,7 +81,7 @@ impl Key<'_> {
 pub struct Trace {
     /// How far off each predictor was, steps, saturating.
     error: [u8; PREDICTORS],
-    /// Position less temporal prediction, 1/64 texel, saturating.
+    /// Position less temporal prediction, 1/32 texel, saturating.
     correction: [i16; 2],
     /// The residual that was coded, steps, saturating.
     noise: u8,
@@ -97,7 +97,7 @@ pub trait Source {
     fn sheets(&mut self, ahead: bool, cell: usize) -> Sheets;
 
     /// The residual to code, in steps along u and v, for the layer of `label` at `node` whose `predicted` position is in
-    /// 1/64 texel. `contexts` tell what residuals cost.
+    /// 1/32 texel. `contexts` tell what residuals cost.
     fn residual(&mut self, node: usize, label: u8, predicted: [i32; 2], contexts: [&[Probability]; 2]) -> [i32; 2];
 
     /// The code of field `which` for the layer of `label` at `node`.
@@ -129,7 +129,7 @@ pub struct Setting<'s, 'm, L> {
     pub grid: Grid,
     /// The record of a label.
     pub label: L,
-    /// Coordinates are coded in steps of 2^this / 64 texel.
+    /// Coordinates are coded in steps of 2^this / 32 texel.
     pub step_log2: u32,
     /// The key before, unless this one is independent.
     pub before: Option<&'s Key<'m>>,
@@ -273,7 +273,7 @@ fn code_layer<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
     let (predicted, noise) = candidates.choose(&neighbours, &record);
     let round = |x: i32| {
         let half = (1i32 << setting.step_log2) >> 1;
-        (x.clamp(0, 0xffff).wrapping_add(half)) >> setting.step_log2 << setting.step_log2
+        (x.clamp(fixed::KEY_MIN, fixed::KEY_MAX).wrapping_add(half)) >> setting.step_log2 << setting.step_log2
     };
     let predicted = predicted.map(round);
     let class = usize::from(support < 5).wrapping_mul(NOISE_CLASSES).wrapping_add(noise);

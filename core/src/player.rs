@@ -241,7 +241,6 @@ impl<'a> Player<'a> {
     /// Interpolates the nodes around a row of cells and looks up its sheets.
     fn load(&mut self, row: usize) {
         let grid = self.bundle.grid();
-        let texture = self.bundle.texture();
         // How long ago the key at the start of the interval was decoded, and through it the others.
         let age = self.needed().ahead;
         let bundle = self.bundle;
@@ -261,7 +260,7 @@ impl<'a> Player<'a> {
             after: at(2).filter(|_| cubic),
         };
         let mut fill = |nodes: &mut NodeRow<'_>, row: usize| {
-            let layers = nodes.fill(grid, row, &around, &self.moment, &texture);
+            let layers = nodes.fill(grid, row, &around, &self.moment);
             self.work.layers = self.work.layers.wrapping_add(layers);
         };
         let [top, bottom] = rows;
@@ -319,7 +318,7 @@ impl Drawing<'_, '_> {
                 continue;
             };
             let count = pixels.len() as u32;
-            span::all(pixels, back.span(top, bottom, step, log2), |uv| make(uv, back.label()));
+            span::all(pixels, back.span(top, bottom, step, log2), &texture, |uv| make(uv, back.label()));
             // Back to front: the frontmost sheet that covers a pixel has the last word.
             for sheet in front.iter().rev() {
                 let record = self.bundle.label(sheet.label());

@@ -30,19 +30,38 @@ impl Span {
     }
 }
 
+impl Span {
+    /// The position `pixels` pixels on.
+    const fn at(&self, pixels: usize) -> PlayUv {
+        let count = pixels as i32;
+        PlayUv {
+            u: self.from.u.wrapping_add(self.step.u.wrapping_mul(count)),
+            v: self.from.v.wrapping_add(self.step.v.wrapping_mul(count)),
+        }
+    }
+}
+
 impl PlayUv {
     const fn plus(self, step: Self) -> Self {
         Self { u: self.u.wrapping_add(step.u), v: self.v.wrapping_add(step.v) }
     }
 }
 
-/// Paints every pixel of `out`; `make` turns a position into a pixel.
+/// Paints every pixel of `out`; `make` turns a position into a pixel. Positions outside the picture count as its edge.
 #[inline(always)]
-pub fn all<T>(out: &mut [T], span: Span, make: impl Fn(PlayUv) -> T) {
+pub fn all<T>(out: &mut [T], span: Span, texture: &Texture<'_>, make: impl Fn(PlayUv) -> T) {
     let mut uv = span.from;
-    for pixel in out {
-        *pixel = make(uv);
-        uv = uv.plus(span.step);
+    // A span is straight: if both its ends are inside, all of it is.
+    if texture.holds(uv) && texture.holds(span.at(out.len())) {
+        for pixel in out {
+            *pixel = make(uv);
+            uv = uv.plus(span.step);
+        }
+    } else {
+        for pixel in out {
+            *pixel = make(texture.clamp(uv));
+            uv = uv.plus(span.step);
+        }
     }
 }
 
@@ -84,7 +103,7 @@ pub fn covered<T>(out: &mut [T], span: Span, test: &Test<'_>, make: impl Fn(Play
     for pixel in out {
         let inside = a > 0 && (!test.strip || b > 0);
         if inside && test.chart.is_none_or(|chart| chart.covers(uv, &test.texture)) {
-            *pixel = make(uv);
+            *pixel = make(test.texture.clamp(uv));
         }
         uv = uv.plus(span.step);
         (a, b) = (a.wrapping_add(da), b.wrapping_add(db));

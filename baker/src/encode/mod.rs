@@ -9,7 +9,7 @@ use crate::fit::Fit;
 use crate::gbuffer::GBuffer;
 use crate::sheets::{KeyGrid, Layers, Sheets};
 use cubist_core::coder::Probability;
-use cubist_core::fixed::{KEY_BITS, field_code};
+use cubist_core::fixed::{KEY_BITS, KEY_MAX, KEY_MIN, field_code};
 use cubist_core::format::{
     ATLAS, Atlas, Envelope, FIXED, INFO, KeyEntry, LABELS, LabelRecord, Limits, MAGIC, MASK, MASKED, PATH, Path, STRIP, Section, VERSION,
 };
@@ -21,7 +21,7 @@ use range::Encoder;
 /// How keys are coded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CodingSettings {
-    /// Coordinates are stored in steps of 2^this / 64 texel.
+    /// Coordinates are stored in steps of 2^this / 32 texel.
     pub step_log2: u8,
     /// What a bit is worth, in squared texels of error summed over pixels, when residuals of ghosts are
     /// rounded towards zero; 0 keeps them all.
@@ -276,7 +276,7 @@ impl Source for Wanted<'_> {
         let free = self.settings.lambda > 0.0 && !self.visible(node, label);
         let mut residual = [0, 0];
         for axis in 0..2 {
-            let wanted = self.fit.uv[layer][axis].clamp(0.0, 65_535.0 / unit);
+            let wanted = self.fit.uv[layer][axis].clamp(KEY_MIN as f32 / unit, KEY_MAX as f32 / unit);
             let exact = (wanted - predicted[axis] as f32 / unit) / step;
             let nearest = libm::roundf(exact) as i32;
             residual[axis] = nearest;
