@@ -33,7 +33,9 @@ impl<'m> Cutter<'m> {
         self.words = self.words.saturating_add(words);
         let Some((head, rest)) = core::mem::take(&mut self.rest).split_at_mut_checked(words) else { return &mut [] };
         self.rest = rest;
-        bytemuck::try_cast_slice_mut(head).unwrap_or(&mut []).get_mut(..count).unwrap_or(&mut [])
+        // Cut to the byte first: what the last word has to spare need not be a whole T.
+        let bytes = bytemuck::cast_slice_mut::<u32, u8>(head).get_mut(..count.saturating_mul(size_of::<T>()));
+        bytes.and_then(|bytes| bytemuck::try_cast_slice_mut(bytes).ok()).unwrap_or(&mut [])
     }
 }
 
