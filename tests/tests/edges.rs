@@ -10,29 +10,47 @@ use cubist_tests::{play, scenes};
 use glam::DVec3;
 use std::sync::Arc;
 
+/// The beginning of another camera's path, as slow as its own 128 frames are.
+struct Beginning(Arc<dyn Path>, f64);
+
+impl Path for Beginning {
+    fn pose(&self, s: f64) -> Pose {
+        self.0.pose(s * self.1)
+    }
+}
+
 fn street(size: [u32; 2], frames: u32) -> Scene {
-    scenes::reduced("street", size, frames).expect("there is such a scene")
+    let mut scene = scenes::reduced("street", size, frames).expect("there is such a scene");
+    scene.camera = Arc::new(Beginning(scene.camera, f64::from(frames) / 128.0));
+    scene
 }
 
 /// Bakes and plays `scene`: its bytes, and how well they play.
 fn check(scene: &Scene, settings: &Settings) -> (Vec<u8>, Quality) {
     let (flat, encoded) = scenes::bake(scene, settings).expect("it bakes");
+    let quality = figures::quality(&encoded.bundle, &flat.atlas).expect("it plays");
     let bundle = Bundle::parse(&encoded.bundle).expect("the baker's bytes parse");
     let play = scene.playback;
     assert_eq!(
         (bundle.size(), bundle.frames(), bundle.fps(), bundle.looping()),
         ((play.width, play.height), play.frames, play.fps, play.looping)
     );
-    let quality = figures::quality(&encoded.bundle, &flat.atlas).expect("it plays");
     println!("{} {}x{}, {} frames: {} bytes, {quality:?}", scene.name, play.width, play.height, play.frames, encoded.bundle.len());
-    (encoded.bundle, quality)
+    (encoded.bundle.clone(), quality)
+}
+
+/// A key a frame, every sheet kept: what is left is what cells of 8 pixels cannot follow.
+fn dense() -> Settings {
+    Settings { key_interval: 1, least_pixels: 1, ..Settings::default() }
 }
 
 #[test]
 fn screens_of_any_shape_play() {
-    for (size, least) in [([1, 1], 20.0), ([2, 300], 20.0), ([300, 1], 20.0), ([128, 64], 20.0), ([240, 240], 20.0), ([120, 200], 20.0)] {
-        let (_, quality) = check(&street(size, 9), &Settings::default());
+    // The field of view is that of the height: a screen 300 pixels wide and 1 high looks to all sides at once.
+    for (size, least) in [([1, 1], 22.0), ([2, 300], 22.0), ([300, 1], 18.0), ([128, 64], 20.0), ([240, 240], 20.0), ([120, 200], 20.0)] {
+        let (_, quality) = check(&street(size, 5), &dense());
         assert!(quality.psnr_mean > least, "{size:?}: {quality:?}");
+        assert!(quality.wrong_surface_percent < 3.0 || size[1] == 1, "{size:?}: {quality:?}");
     }
 }
 
@@ -41,8 +59,8 @@ fn paths_of_one_to_three_frames_play_nearly_as_they_were_cast() {
     for (frames, looping) in [(1, false), (2, false), (3, false), (1, true), (2, true), (3, true)] {
         let mut scene = street(scenes::SIZE, frames);
         scene.playback.looping = looping;
-        let (_, quality) = check(&scene, &Settings { key_interval: 1, ..Settings::default() });
-        assert!(quality.psnr_mean > 24.0, "{frames} frames, looping {looping}: {quality:?}");
+        let (_, quality) = check(&scene, &dense());
+        assert!(quality.psnr_mean > 22.0 && quality.wrong_surface_percent < 2.0, "{frames} frames, looping {looping}: {quality:?}");
     }
 }
 
@@ -69,7 +87,7 @@ fn a_camera_that_stands_still_shows_one_picture() {
     let mut scene = street(scenes::SIZE, 20);
     scene.camera = Arc::new(Still(scene.camera.pose(0.3)));
     let (still, quality) = check(&scene, &Settings::default());
-    assert!(quality.psnr_mean > 24.0, "{quality:?}");
+    assert!(quality.psnr_mean > 22.0, "{quality:?}");
     let frames = play::frames(&still, 0..20).expect("it plays");
     let different = |picture: &[u16]| picture.iter().zip(&frames[0]).filter(|(a, b)| a != b).count();
     let most = frames.iter().map(|picture| different(picture)).max().unwrap_or(0);
