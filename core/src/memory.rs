@@ -6,6 +6,7 @@ use crate::cell::{Layer, NodeRow, RowSheets, Sheet};
 use crate::key::{self, Key};
 use crate::lists::{self, Lists};
 use crate::record::Stream;
+use crate::timeline;
 use bytemuck::Pod;
 
 /// The caller's memory, cut up.
@@ -29,19 +30,23 @@ struct Cutter<'m> {
 
 impl<'m> Cutter<'m> {
     fn take<T: Pod>(&mut self, count: usize) -> &'m mut [T] {
-        let words = count.saturating_mul(size_of::<T>()).div_ceil(4);
+        let bytes = count.saturating_mul(size_of::<T>());
+        let words = bytes.div_ceil(4);
         self.words = self.words.saturating_add(words);
         let Some((head, rest)) = core::mem::take(&mut self.rest).split_at_mut_checked(words) else { return &mut [] };
         self.rest = rest;
-        // Cut to the byte first: what the last word has to spare need not be a whole T.
-        let bytes = bytemuck::cast_slice_mut::<u32, u8>(head).get_mut(..count.saturating_mul(size_of::<T>()));
-        bytes.and_then(|bytes| bytemuck::try_cast_slice_mut(bytes).ok()).unwrap_or(&mut [])
+        // Whole words hold a whole number of most types, but not of all: the rest is left over.
+        let exact = bytemuck::try_cast_slice_mut(head).unwrap_or(&mut []).get_mut(..bytes).unwrap_or(&mut []);
+        bytemuck::try_cast_slice_mut::<u8, T>(exact).unwrap_or(&mut [])
     }
 }
 
 fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
     let (grid, limits) = (bundle.grid(), bundle.limits());
     let (key_layers, row_layers) = (usize::from(limits.key_layers), usize::from(limits.row_layers));
+    let (back, ahead) = timeline::reach(bundle.path().time);
+    // Playing needs these; telling the next key needs the last two and itself.
+    let slots = back.saturating_add(ahead).saturating_add(1).max(3);
     let one_more = |count: usize| count.saturating_add(1);
     Workspace {
         palette: cutter.take(256),
@@ -49,11 +54,12 @@ fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
             list_contexts: cutter.take(lists::CONTEXTS),
             key_contexts: cutter.take(key::CONTEXTS),
             traces: cutter.take(row_layers.saturating_mul(2)),
-            keys: core::array::from_fn(|_| Key {
-                start: cutter.take(one_more(grid.nodes())),
-                label: cutter.take(key_layers),
-                uv: cutter.take(key_layers),
+            keys: core::array::from_fn(|slot| match slot < slots {
+                true => Key { start: cutter.take(one_more(grid.nodes())), label: cutter.take(key_layers), uv: cutter.take(key_layers) },
+                false => Key::default(),
             }),
+            slots,
+            turn: 0,
             lists: core::array::from_fn(|_| Lists::new(cutter.take(one_more(grid.rows)), cutter.take(usize::from(limits.list_bytes)))),
         },
         rows: core::array::from_fn(|_| NodeRow {
