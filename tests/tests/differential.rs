@@ -5,21 +5,25 @@
 //! - a layer in time to nearest: 1 / 2^17;
 //! - the left and the right end of a span downwards: 1 / 2^16;
 //! - the step along it to nearest: (cell - 1) / 2^17 at its last pixel;
-//! - the weight between two keys to nearest, where their distance is no power of two: motion / 2^(WEIGHT_BITS + 1). This is the
+//! - the weights of four keys, each by at most [`WEIGHT`]: three of them times how far their keys are from the fourth. This is the
 //!   largest by far for what passes near the camera; it moves whole sheets, and only in time.
 //!
 //! Wherever label or colour differ, a position that was looked at must be within that bound of an edge between texels.
 
 use cubist_baker::bake::Settings;
 use cubist_core::Bundle;
-use cubist_core::fixed::WEIGHT_BITS;
+use cubist_core::fixed::ONE;
+use cubist_core::format::{TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
+use cubist_core::timeline;
 use cubist_tests::reference::{Pixel, Reference, Weights};
-use cubist_tests::{play, scenes};
+use cubist_tests::{play, reference, scenes};
 
 /// Pixels whose colour may differ from what the player's own weights ask for, percent.
 const DIFFERING: f64 = 0.03;
-/// The same for exact weights, which the player does not have where keys stand no power of two apart.
-const DIFFERING_IN_TIME: f64 = 0.1;
+/// How far a weight of the player may be from the exact one.
+const WEIGHT: f64 = 3.0 / ONE as f64;
+/// The same for exact weights.
+const DIFFERING_IN_TIME: f64 = 0.15;
 
 /// What a comparison found.
 #[derive(Debug, Default)]
@@ -44,7 +48,7 @@ impl Found {
 /// The bound of one pixel, texels.
 fn bound(pixel: &Pixel, cell: u32, weights: Weights) -> f64 {
     let rounding = f64::from(cell + 2) / f64::from(1u32 << 17);
-    let motion = if weights == Weights::Exact { pixel.motion / f64::from(1u32 << (WEIGHT_BITS + 1)) } else { 0.0 };
+    let motion = if weights == Weights::Exact { 3.0 * WEIGHT * pixel.motion } else { 0.0 };
     // The slack is what f64 itself rounds.
     rounding + motion + 1e-9
 }
@@ -83,7 +87,7 @@ fn compare(bytes: &[u8], frames: impl IntoIterator<Item = u32>, weights: Weights
 /// Compares `frames` with both oracles, prints what was found (seen with `--nocapture`), and asserts the shares that may differ.
 fn check(name: &str, bytes: &[u8], frames: impl IntoIterator<Item = u32> + Clone) -> Found {
     let exact = compare(bytes, frames.clone(), Weights::Exact);
-    let rounded = compare(bytes, frames, Weights::Rounded);
+    let rounded = compare(bytes, frames, Weights::Player);
     for (weights, found) in [("exact", &exact), ("the player's", &rounded)] {
         println!(
             "{name}, {weights} weights: {:.4} % differ, {} labels, {:.1e} texels apart (bound {:.1e})",
@@ -108,10 +112,32 @@ fn settings(cell: u32, key_interval: u32) -> Settings {
 }
 
 #[test]
-fn cells_and_intervals_of_eight_are_exact() {
+fn weights_are_near_the_exact_ones() {
+    for time in [TIME_HOLD, TIME_LINEAR, TIME_CUBIC] {
+        let mut worst = 0.0f64;
+        for length in 1..=64 {
+            for (before, after) in [(length, length), (1, 9), (200, 3), (7, 256), (8, 8)] {
+                let lengths = [before, length, after];
+                for passed in 0..=length {
+                    let found = timeline::weights(time, lengths, passed);
+                    for (set, missing) in found.iter().zip([[false, false], [true, false], [false, true], [true, true]]) {
+                        let exact = reference::weights(time, lengths, f64::from(passed) / f64::from(length), missing);
+                        let apart = set.iter().zip(exact).map(|(&weight, exact)| (f64::from(weight) / f64::from(ONE) - exact).abs());
+                        worst = apart.fold(worst, f64::max);
+                    }
+                }
+            }
+        }
+        println!("time {time}: weights are at most {:.2} / {ONE} off", worst * f64::from(ONE));
+        assert!(worst <= if time == TIME_CUBIC { WEIGHT } else { 0.5 / f64::from(ONE) }, "time {time}: {worst}");
+    }
+}
+
+#[test]
+fn cells_and_straight_intervals_of_eight_are_exact() {
     // 6 bits of a stored coordinate, 3 of time, 3 down, 3 across: 15 of the 16 there are. Only the 11 bits of a position clamped to
     // the edge of the source image, 3 down, 3 across leave half a unit a step.
-    let bytes = bake("street", scenes::SIZE, 33, &settings(8, 8));
+    let bytes = bake("street", scenes::SIZE, 33, &Settings { time: TIME_LINEAR, ..settings(8, 8) });
     let found = check("street, 8 and 8", &bytes, [0, 1, 7, 8, 15, 20, 31, 32]);
     assert_eq!((found.colours, found.labels), (0, 0));
     assert!(found.apart <= 3.5 / 65_536.0, "{found:?}");
@@ -130,6 +156,14 @@ fn intervals_that_are_no_power_of_two_agree() {
     for (name, interval) in [("arch", 5), ("mirrors", 12), ("terrain", 7)] {
         let bytes = bake(name, scenes::SIZE, 32, &settings(8, interval));
         check(&format!("{name}, keys every {interval}"), &bytes, (0..32).step_by(3));
+    }
+}
+
+#[test]
+fn held_and_straight_time_agree() {
+    for (name, time, interval) in [("street", TIME_LINEAR, 7), ("columns", TIME_HOLD, 4)] {
+        let bytes = bake(name, scenes::SIZE, 32, &Settings { time, ..settings(8, interval) });
+        check(&format!("{name}, time {time}"), &bytes, (0..32).step_by(3));
     }
 }
 

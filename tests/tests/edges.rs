@@ -60,7 +60,7 @@ fn paths_of_one_to_three_frames_play_nearly_as_they_were_cast() {
         let mut scene = street(scenes::SIZE, frames);
         scene.playback.looping = looping;
         let (_, quality) = check(&scene, &dense());
-        assert!(quality.psnr_mean > 22.0 && quality.wrong_surface_percent < 2.0, "{frames} frames, looping {looping}: {quality:?}");
+        assert!(quality.psnr_mean > 21.0 && quality.wrong_surface_percent < 3.0, "{frames} frames, looping {looping}: {quality:?}");
     }
 }
 
@@ -87,7 +87,7 @@ fn a_camera_that_stands_still_shows_one_picture() {
     let mut scene = street(scenes::SIZE, 20);
     scene.camera = Arc::new(Still(scene.camera.pose(0.3)));
     let (still, quality) = check(&scene, &Settings::default());
-    assert!(quality.psnr_mean > 22.0, "{quality:?}");
+    assert!(quality.psnr_mean > 20.0, "{quality:?}");
     let frames = play::frames(&still, 0..20).expect("it plays");
     let different = |picture: &[u16]| picture.iter().zip(&frames[0]).filter(|(a, b)| a != b).count();
     let most = frames.iter().map(|picture| different(picture)).max().unwrap_or(0);
