@@ -4,8 +4,7 @@
 use anyhow::{Context, Result, bail};
 use clap::{Parser, Subcommand};
 use cubist_baker::bake::Settings;
-use cubist_baker::scene::load::{Overrides, load, load_builtin};
-use cubist_baker::scene::{Scene, builtin};
+use cubist_baker::scene::{Overrides, Scene, builtin, load, load_builtin};
 use cubist_core::Bundle;
 use cubist_tests::{figures, scenes};
 use serde_json::{Value, json};
