@@ -115,6 +115,8 @@ impl<'a> Player<'a> {
     /// Pixels come in this byte order from now on.
     pub fn set_byte_order(&mut self, order: ByteOrder) {
         let (colours, _) = self.bundle.atlas().palette.as_chunks::<2>();
+        // A texel past the palette's end must not show what the caller's memory held.
+        self.space.palette.fill(0);
         for (entry, bytes) in self.space.palette.iter_mut().zip(colours) {
             let colour = u16::from_le_bytes(*bytes);
             *entry = match order {
