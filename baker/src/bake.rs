@@ -7,6 +7,7 @@ use crate::gbuffer::Hits;
 use crate::scene::Scene;
 use crate::sheets::{self, KeyGrid, Layers};
 use crate::trace::Tracer;
+use crate::verify::VerifyError;
 use crate::{fit, order};
 use std::time::Instant;
 use thiserror::Error;
@@ -26,6 +27,31 @@ pub enum BakeError {
     /// There is no source image.
     #[error(transparent)]
     Atlas(#[from] AtlasError),
+    /// No ray of any frame hits a triangle.
+    #[error("the camera sees nothing: expected some of {rays} rays to hit a triangle, none does; check the camera's place, its direction and fov")]
+    Nothing {
+        /// Rays cast.
+        rays: u64,
+    },
+    /// Even the smallest bundle that a search found is too large.
+    #[error("--budget: expected room for {smallest} bytes, the smallest bundle of this scene, found {budget}; raise it, or lower --size or --frames")]
+    Budget {
+        /// Bytes allowed.
+        budget: u64,
+        /// Bytes of the smallest bundle found.
+        smallest: u64,
+    },
+    /// No bundle that a search found reaches the quality.
+    #[error("--psnr: found at most {nearest:.2} dB, expected {asked:.2} dB; ask for less, or lower --cell or --density")]
+    Psnr {
+        /// The mean PSNR asked for, dB.
+        asked: f64,
+        /// The best that a search found, dB.
+        nearest: f64,
+    },
+    /// The player refuses what was baked: a fault of the baker.
+    #[error(transparent)]
+    Verify(#[from] VerifyError),
     /// The scene is more than a bundle can hold.
     #[error("{what}: {found}, but a bundle holds at most {most}; {cure}")]
     Limit {

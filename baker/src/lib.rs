@@ -10,8 +10,18 @@ pub mod chart;
 pub mod encode;
 pub mod fit;
 pub mod gbuffer;
+pub mod inspect;
+pub mod job;
+pub mod metrics;
 pub mod order;
+pub mod report;
 pub mod scene;
 pub mod shade;
 pub mod sheets;
 pub mod trace;
+pub mod truth;
+pub mod tune;
+pub mod verify;
+
+pub use job::{Goal, Options, TruthFrames, bake_scene};
+pub use report::Report;
