@@ -28,13 +28,17 @@ pub enum BakeError {
     #[error(transparent)]
     Atlas(#[from] AtlasError),
     /// No ray of any frame hits a triangle.
-    #[error("the camera sees nothing: expected some of {rays} rays to hit a triangle, none does; check the camera's place, its direction and fov")]
+    #[error(
+        "the camera sees nothing: expected some of {rays} rays to hit a triangle, none does; check the camera's place, its direction and fov"
+    )]
     Nothing {
         /// Rays cast.
         rays: u64,
     },
     /// Even the smallest bundle that a search found is too large.
-    #[error("--budget: expected room for {smallest} bytes, the smallest bundle of this scene, found {budget}; raise it, or lower --size or --frames")]
+    #[error(
+        "--budget: expected room for {smallest} bytes, the smallest bundle of this scene, found {budget}; raise it, or lower --size or --frames"
+    )]
     Budget {
         /// Bytes allowed.
         budget: u64,

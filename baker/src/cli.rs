@@ -15,7 +15,7 @@ pub struct Cli {
     pub command: Option<Command>,
     /// Baking.
     #[command(flatten)]
-    pub bake: Option<Bake>,
+    pub bake: Bake,
 }
 
 const EXAMPLES: &str = "\
@@ -46,10 +46,11 @@ pub enum Command {
 #[derive(Args, Debug)]
 pub struct Bake {
     /// A scene file (.toml), a model (.glb .gltf .obj .ply), or builtin:NAME.
-    pub scene: String,
+    #[arg(required = true)]
+    pub scene: Option<String>,
     /// The bundle to write; folders on the way are made.
-    #[arg(short, long, value_name = "OUT.cubist")]
-    pub output: PathBuf,
+    #[arg(short, long, value_name = "OUT.cubist", required = true)]
+    pub output: Option<PathBuf>,
     /// What replaces the scene's playback.
     #[command(flatten)]
     pub playback: Playback,
@@ -231,7 +232,23 @@ mod tests {
         for (text, bytes) in [("1", 1), ("65536", 65_536), ("256K", 262_144), ("2M", 2_097_152), ("2m", 2_097_152), ("1.5k", 1536)] {
             assert_eq!(budget(text), Ok(bytes), "{text}");
         }
-        for text in ["", "K", "0", "0K", "-1", "1.5", "1e3", "64KB", "64 K", "K64", "99999999999999999999", "99999999999999999M", "1.2.3K", "µ", "6µ"] {
+        for text in [
+            "",
+            "K",
+            "0",
+            "0K",
+            "-1",
+            "1.5",
+            "1e3",
+            "64KB",
+            "64 K",
+            "K64",
+            "99999999999999999999",
+            "99999999999999999M",
+            "1.2.3K",
+            "µ",
+            "6µ",
+        ] {
             assert!(budget(text).is_err(), "{text}");
         }
     }
@@ -249,9 +266,9 @@ mod tests {
     fn the_command_line_is_consistent() {
         Cli::command().debug_assert();
         let cli = Cli::try_parse_from(["cubist-bake", "a.toml", "-o", "a.cubist", "--budget", "64K", "--truth", "all"]).unwrap();
-        let options = cli.bake.unwrap().options(0.5);
+        let options = cli.bake.options(0.5);
         assert_eq!((options.goal, options.truth, options.load_seconds), (Goal::Budget(65_536), TruthFrames::All, 0.5));
-        assert!(Cli::try_parse_from(["cubist-bake", "inspect", "a.cubist", "--json"]).unwrap().bake.is_none());
+        assert!(Cli::try_parse_from(["cubist-bake", "inspect", "a.cubist", "--json"]).unwrap().command.is_some());
         for wrong in [
             &["cubist-bake", "a.toml"][..],
             &["cubist-bake", "a.toml", "-o", "b", "--budget", "1K", "--psnr", "30"],

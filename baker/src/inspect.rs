@@ -248,14 +248,33 @@ impl Inspection {
         line(String::new());
         let (p, [width, height]) = (&self.path, self.path.size);
         line(format!("PATH  {} frames of {width} x {height} at {} frames/s, looping: {}", p.frames, p.fps, yes(p.looping)));
-        line(format!("      grid: {} x {} cells of {} pixels; time: {}; coordinates in 1/{} texel", p.cells[0], p.cells[1], p.cell, p.time, p.steps_a_texel));
-        line(format!("      keys: {}, table {} bytes, records {} bytes, {:.1} bytes a frame", self.keys.len(), p.table_bytes, p.record_bytes, self.key_bytes() as f64 / f64::from(p.frames)));
+        line(format!(
+            "      grid: {} x {} cells of {} pixels; time: {}; coordinates in 1/{} texel",
+            p.cells[0], p.cells[1], p.cell, p.time, p.steps_a_texel
+        ));
+        line(format!(
+            "      keys: {}, table {} bytes, records {} bytes, {:.1} bytes a frame",
+            self.keys.len(),
+            p.table_bytes,
+            p.record_bytes,
+            self.key_bytes() as f64 / f64::from(p.frames)
+        ));
         for (index, key) in self.keys.iter().enumerate() {
-            line(format!("      key {index:>4} at frame {:>5} {:>8} bytes{}", key.frame, key.bytes, if key.independent { "  independent" } else { "" }));
+            line(format!(
+                "      key {index:>4} at frame {:>5} {:>8} bytes{}",
+                key.frame,
+                key.bytes,
+                if key.independent { "  independent" } else { "" }
+            ));
         }
         let image = &self.image;
-        let covered = image.covered_texels.map_or_else(|| "all".to_owned(), |n| format!("{n}, {:.1} %", 100.0 * n as f64 / f64::from(image.size[0] * image.size[1])));
-        line(format!("ATLS  {} x {} texels, encoding {}, {} colours; covered: {covered}", image.size[0], image.size[1], image.encoding, image.colours));
+        let covered = image
+            .covered_texels
+            .map_or_else(|| "all".to_owned(), |n| format!("{n}, {:.1} %", 100.0 * n as f64 / f64::from(image.size[0] * image.size[1])));
+        line(format!(
+            "ATLS  {} x {} texels, encoding {}, {} colours; covered: {covered}",
+            image.size[0], image.size[1], image.encoding, image.colours
+        ));
         for (index, row) in self.palette.chunks(12).enumerate() {
             line(format!("      colours from {:>3}  {}", index * 12, row.join(" ")));
         }
@@ -266,11 +285,17 @@ impl Inspection {
                 (Some([u, v]), Some([du, dv])) => format!("  fixed to the screen: ({u:.3}, {v:.3}) + ({du:.5}, {dv:.5}) a pixel"),
                 _ => String::new(),
             };
-            line(format!("      label {index:>3}  {x0:>4}..{x1:<4} x {y0:>4}..{y1:<4}{}{fixed}", if label.masked { "  masked" } else { "" }));
+            line(format!(
+                "      label {index:>3}  {x0:>4}..{x1:<4} x {y0:>4}..{y1:<4}{}{fixed}",
+                if label.masked { "  masked" } else { "" }
+            ));
         }
         let l = &self.limits;
         line(format!("Memory  {} bytes of working memory and a row of {} bytes", self.workspace, width * 2));
-        line(format!("Limits  a key: {} layers, {} bytes of sheet lists; a row: {} layers, {} sheets; a cell: {} sheets; a seek: {} keys", l.key_layers, l.list_bytes, l.row_layers, l.row_sheets, l.cell_sheets, l.seek_keys));
+        line(format!(
+            "Limits  a key: {} layers, {} bytes of sheet lists; a row: {} layers, {} sheets; a cell: {} sheets; a seek: {} keys",
+            l.key_layers, l.list_bytes, l.row_layers, l.row_sheets, l.cell_sheets, l.seek_keys
+        ));
         out
     }
 }

@@ -7,6 +7,7 @@ mod diagnostics;
 mod files;
 
 use anyhow::{Context, Result};
+use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
 use cli::{Bake, Cli, Command, Inspect, Playback, Throughput};
 use cubist_baker::inspect::Inspection;
@@ -21,11 +22,11 @@ use std::time::Instant;
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let result = match (&cli.command, &cli.bake) {
-        (Some(Command::Inspect(args)), _) => inspect(args),
-        (Some(Command::Throughput(args)), _) => throughput(args),
-        (None, Some(args)) => bake(args),
-        (None, None) => Cli::command().error(clap::error::ErrorKind::MissingRequiredArgument, "expected a SCENE and -o OUT.cubist").exit(),
+    let result = match (&cli.command, &cli.bake.scene, &cli.bake.output) {
+        (Some(Command::Inspect(args)), ..) => inspect(args),
+        (Some(Command::Throughput(args)), ..) => throughput(args),
+        (None, Some(scene), Some(output)) => bake(scene, output, &cli.bake),
+        _ => Cli::command().error(ErrorKind::MissingRequiredArgument, "expected a SCENE and -o OUT.cubist").exit(),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -36,11 +37,11 @@ fn main() -> ExitCode {
     }
 }
 
-fn bake(args: &Bake) -> Result<()> {
+fn bake(name: &str, output: &Path, args: &Bake) -> Result<()> {
     files::clean_up_when_interrupted()?;
     threads(args.threads)?;
     let start = Instant::now();
-    let scene = load(&args.scene, &args.playback)?;
+    let scene = load(name, &args.playback)?;
     let options = args.options(start.elapsed().as_secs_f64());
     let bar = bar(args.quiet);
     let baked = job::run(&scene, &options, &|stage, part| {
@@ -48,8 +49,8 @@ fn bake(args: &Bake) -> Result<()> {
         bar.set_position((part * 1000.0) as u64);
     });
     bar.finish_and_clear();
-    let baked = baked.with_context(|| args.scene.clone())?;
-    files::write(&args.output, &baked.bundle)?;
+    let baked = baked.with_context(|| name.to_owned())?;
+    files::write(output, &baked.bundle)?;
     if let Some(path) = &args.report {
         files::write(path, (baked.report.json() + "\n").as_bytes())?;
     }
@@ -60,7 +61,7 @@ fn bake(args: &Bake) -> Result<()> {
         return Ok(());
     }
     for warning in &baked.report.warnings {
-        eprintln!("warning: {}: {warning}", args.scene);
+        eprintln!("warning: {name}: {warning}");
     }
     print(&aligned(&report::table(&baked.report)))
 }
@@ -101,12 +102,15 @@ fn throughput(args: &Throughput) -> Result<()> {
 
 /// Loads what SCENE names.
 fn load(name: &str, playback: &Playback) -> Result<Scene> {
-    let overrides =
-        scene::Overrides { size: playback.size, frames: playback.frames, fps: playback.fps, looping: playback.looping.then_some(true) };
-    Ok(match name.strip_prefix("builtin:") {
-        Some(builtin) => scene::load_builtin(builtin, &overrides)?,
-        None => scene::load(Path::new(name), &overrides)?,
-    })
+    let builtin = name.strip_prefix("builtin:").with_context(|| format!("{name}: expected builtin:NAME"))?;
+    let mut scene = scene::builtin::build(builtin)
+        .with_context(|| format!("{name}: expected one of {}, found \"{builtin}\"", scene::builtin::NAMES.join(", ")))?;
+    let play = &mut scene.playback;
+    (play.width, play.height) = playback.size.unwrap_or((play.width, play.height));
+    play.frames = playback.frames.unwrap_or(play.frames);
+    play.fps = playback.fps.unwrap_or(play.fps);
+    play.looping |= playback.looping;
+    Ok(scene)
 }
 
 fn threads(count: Option<u16>) -> Result<()> {

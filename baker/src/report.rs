@@ -154,8 +154,7 @@ impl Report {
         let Origin { scene, flat, encoded, settings } = origin;
         let play = &scene.playback;
         let frames = f64::from(play.frames.max(1));
-        let (atlas, labels, mask) =
-            (inspection.section_bytes(ATLAS), inspection.section_bytes(LABELS), inspection.section_bytes(MASK));
+        let (atlas, labels, mask) = (inspection.section_bytes(ATLAS), inspection.section_bytes(LABELS), inspection.section_bytes(MASK));
         let keys = inspection.key_bytes();
         let (image, figures) = (&flat.atlas.image, &flat.atlas.figures);
         Self {
@@ -268,12 +267,22 @@ pub fn table(report: &Report) -> Vec<(String, String)> {
     row("grid", format!("{} keys, one every {} frames; cells of {} pixels", grid.keys, grid.key_interval, grid.cell));
     row(
         "source image",
-        format!("{} bytes: {} x {} texels, {} colours, {:.0} % covered", grouped(bytes.atlas), image.width, image.height, image.colours, 100.0 * image.fill),
+        format!(
+            "{} bytes: {} x {} texels, {} colours, {:.0} % covered",
+            grouped(bytes.atlas),
+            image.width,
+            image.height,
+            image.colours,
+            100.0 * image.fill
+        ),
     );
     row("labels, mask", format!("{} bytes: {} labels for {} charts", grouped(bytes.labels + bytes.mask), image.labels, image.charts));
     row("keys", format!("{} bytes: {:.1} a frame", grouped(bytes.keys), bytes.keys_per_frame));
     row("bundle", format!("{} bytes: {:.1} a frame", grouped(bytes.bundle), bytes.per_frame));
-    row("PSNR", format!("{:.2} dB mean, {:.2} dB worst frame; bilinear {:.2} dB", quality.psnr_mean, quality.psnr_min, quality.psnr_bilinear));
+    row(
+        "PSNR",
+        format!("{:.2} dB mean, {:.2} dB worst frame; bilinear {:.2} dB", quality.psnr_mean, quality.psnr_min, quality.psnr_bilinear),
+    );
     row("SSIM", format!("{:.4}", quality.ssim_mean));
     row("wrong surface", format!("{:.3} % of the pixels", quality.wrong_surface_percent));
     let path = &quality.path_error_texels;
@@ -282,7 +291,15 @@ pub fn table(report: &Report) -> Vec<(String, String)> {
         let of = if truth.truth_frames == report.frames { "all".to_owned() } else { truth.truth_frames.to_string() };
         row("against truth", format!("{:.2} dB, SSIM {:.4}, over {of} frames", truth.psnr_mean, truth.ssim_mean));
     }
-    row("torn", format!("{:.1} % of the pixels; {:.0} coverage tests a frame, {} at most", work.torn_percent, work.coverage_tests_mean, grouped(work.coverage_tests_worst as usize)));
+    row(
+        "torn",
+        format!(
+            "{:.1} % of the pixels; {:.0} coverage tests a frame, {} at most",
+            work.torn_percent,
+            work.coverage_tests_mean,
+            grouped(work.coverage_tests_worst as usize)
+        ),
+    );
     row("working memory", format!("{} bytes and a row of {}", grouped(report.memory.workspace), grouped(report.memory.row)));
     row("speed here", format!("{:.0} frames/s on one thread", work.host_frames_per_second));
     let search = if seconds.search > 0.0 { format!(", search {:.1}", seconds.search) } else { String::new() };
