@@ -11,10 +11,13 @@ use std::path::Path;
 
 /// Frames shown exact and played.
 const FRAMES: u32 = 3;
+/// How much stronger than it is a difference is shown.
+const GAIN: u8 = 4;
 /// The colour of the charts' borders.
 const BORDER: [u8; 3] = [255, 0, 255];
 
-/// Writes source-image.png, mask.png, and frame-NNNN-exact.png and frame-NNNN-played.png for three frames, into `folder`.
+/// Writes into `folder`: source-image.png, mask.png, and for three frames frame-NNNN-exact.png, frame-NNNN-played.png and
+/// frame-NNNN-compare.png (exact, played, their difference four times as strong).
 pub fn write(folder: &Path, baked: &Baked) -> Result<()> {
     let image = &baked.flat.atlas.image;
     write_png(&folder.join("source-image.png"), image.width, &bordered(image))?;
@@ -24,12 +27,15 @@ pub fn write(folder: &Path, baked: &Baked) -> Result<()> {
     let mut result = Ok(());
     verify::play(&baked.bundle, &spread(gbuffer.frames, FRAMES), |frame, played| {
         let name = |kind: &str| folder.join(format!("frame-{frame:04}-{kind}.png"));
-        let pair = || {
-            write_png(&name("exact"), gbuffer.width, &verify::exact_frame(&baked.flat.atlas, frame))?;
-            write_png(&name("played"), gbuffer.width, played)
+        let write = || {
+            let exact = verify::exact_frame(&baked.flat.atlas, frame);
+            write_png(&name("exact"), gbuffer.width, &exact)?;
+            write_png(&name("played"), gbuffer.width, played)?;
+            let difference: Vec<u8> = exact.iter().zip(played).map(|(a, b)| a.abs_diff(*b).saturating_mul(GAIN)).collect();
+            write_png(&name("compare"), gbuffer.width * 3, &side_by_side(gbuffer.width, [&exact, played, &difference]))
         };
         if result.is_ok() {
-            result = pair();
+            result = write();
         }
     })?;
     result
@@ -58,4 +64,11 @@ fn bordered(image: &SourceImage) -> Vec<u8> {
         }
     }
     out.concat()
+}
+
+/// Three pictures of `width` pixels a row as one.
+fn side_by_side(width: u32, pictures: [&[u8]; 3]) -> Vec<u8> {
+    let row = (width as usize * 3).max(1);
+    let rows = pictures[0].len() / row;
+    (0..rows).flat_map(|y| pictures.iter().flat_map(move |picture| &picture[y * row..(y + 1) * row])).copied().collect()
 }
