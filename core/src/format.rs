@@ -138,6 +138,8 @@ impl LabelRecord {
 pub const TIME_HOLD: u8 = 0;
 /// Straight lines between neighbouring keys.
 pub const TIME_LINEAR: u8 = 1;
+/// Catmull-Rom curves through four keys, straight at a layer's first and last.
+pub const TIME_CUBIC: u8 = 2;
 
 /// One camera path: the screen, the grid, the timeline and the coded keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -154,7 +156,7 @@ pub struct Path<'a> {
     pub looping: bool,
     /// A cell is 2^this pixels wide and high, 2..=5.
     pub cell_log2: u8,
-    /// [`TIME_HOLD`] or [`TIME_LINEAR`].
+    /// [`TIME_HOLD`], [`TIME_LINEAR`] or [`TIME_CUBIC`].
     pub time: u8,
     /// Coordinates are coded in steps of 2^this / 64 texel, 0..=4.
     pub step_log2: u8,

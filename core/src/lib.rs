@@ -47,10 +47,9 @@ mod memory;
 mod player;
 pub mod record;
 mod span;
-mod timeline;
+pub mod timeline;
 
 pub use bundle::{Bundle, checksum};
 pub use error::{BundleError, MemoryError};
 pub use graphics::FrameImage;
 pub use player::{ByteOrder, Frame, Player, Probe, Work};
-pub use timeline::Moment;
