@@ -191,9 +191,11 @@ fn budget(text: &str) -> Result<u64, String> {
     if digits.is_empty() || !digits.bytes().all(|b| b.is_ascii_digit() || (b == b'.' && unit > 1)) {
         return Err(expected());
     }
-    let bytes = match digits.parse::<u64>() {
-        Ok(whole) => whole.checked_mul(unit).ok_or_else(expected)?,
-        Err(_) => (digits.parse::<f64>().map_err(|_| expected())? * unit as f64) as u64,
+    let bytes = if digits.contains('.') {
+        // A cast saturates: what is too large stays too large.
+        (digits.parse::<f64>().map_err(|_| expected())? * unit as f64) as u64
+    } else {
+        digits.parse::<u64>().ok().and_then(|whole| whole.checked_mul(unit)).ok_or_else(expected)?
     };
     if bytes == 0 { Err(expected()) } else { Ok(bytes) }
 }

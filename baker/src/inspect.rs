@@ -2,7 +2,7 @@
 //! Bytes come from a file or the encoder; figures go to `cubist-bake inspect` and to the report's byte counts.
 
 use cubist_core::fixed::KEY_BITS;
-use cubist_core::format::{ATLAS, FIXED, INFO, LABELS, MASK, MASKED, PATH, VERSION};
+use cubist_core::format::{ATLAS, FIXED, INFO, LABELS, MASK, MASKED, PATH, TIME_HOLD, TIME_LINEAR, VERSION};
 use cubist_core::{Bundle, BundleError};
 use serde::Serialize;
 
@@ -182,7 +182,11 @@ impl Inspection {
                 looping: bundle.looping(),
                 cell,
                 cells: [width.div_ceil(cell), height.div_ceil(cell)],
-                time: if path.time == cubist_core::format::TIME_HOLD { "hold" } else { "linear" },
+                time: match path.time {
+                    TIME_HOLD => "hold",
+                    TIME_LINEAR => "linear",
+                    _ => "cubic",
+                },
                 steps_a_texel: (1 << KEY_BITS) >> path.step_log2,
                 table_bytes: path.table.len(),
                 record_bytes: path.records.len(),

@@ -102,15 +102,12 @@ fn throughput(args: &Throughput) -> Result<()> {
 
 /// Loads what SCENE names.
 fn load(name: &str, playback: &Playback) -> Result<Scene> {
-    let builtin = name.strip_prefix("builtin:").with_context(|| format!("{name}: expected builtin:NAME"))?;
-    let mut scene = scene::builtin::build(builtin)
-        .with_context(|| format!("{name}: expected one of {}, found \"{builtin}\"", scene::builtin::NAMES.join(", ")))?;
-    let play = &mut scene.playback;
-    (play.width, play.height) = playback.size.unwrap_or((play.width, play.height));
-    play.frames = playback.frames.unwrap_or(play.frames);
-    play.fps = playback.fps.unwrap_or(play.fps);
-    play.looping |= playback.looping;
-    Ok(scene)
+    let overrides =
+        scene::Overrides { size: playback.size, frames: playback.frames, fps: playback.fps, looping: playback.looping.then_some(true) };
+    Ok(match name.strip_prefix("builtin:") {
+        Some(builtin) => scene::load_builtin(builtin, &overrides)?,
+        None => scene::load(Path::new(name), &overrides)?,
+    })
 }
 
 fn threads(count: Option<u16>) -> Result<()> {

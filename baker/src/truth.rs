@@ -81,12 +81,19 @@ mod tests {
         let mut scene = builtin::build("pyramid").unwrap();
         (scene.playback.width, scene.playback.height) = (32, 24);
         scene.background = crate::scene::Background::Colour([10, 200, 30]);
+        // One white triangle in front of the eye: its right edge runs down the middle of a column of pixels.
+        let lens = Lens::new(&scene, 0);
+        let corner = |x: f64, y: f64| lens.eye + lens.direction(x, y) * 2.0;
+        scene.triangles.truncate(1);
+        scene.triangles[0].position = [corner(20.5, -300.0), corner(20.5, 300.0), corner(-500.0, 12.0)];
+        scene.materials = vec![crate::scene::Material { unlit: true, ..Default::default() }];
+        (scene.triangles[0].material, scene.triangles[0].colour) = (0, [Vec3::ONE; 3]);
         let picture = Truth::new(&scene).frame(0);
         assert_eq!(picture.len(), 32 * 24 * 3);
-        let background = picture.as_chunks::<3>().0.iter().filter(|p| **p == [10, 200, 30]).count();
-        assert!(background > 0 && background < 32 * 24, "{background}");
-        scene.triangles.clear();
-        let empty = Truth::new(&scene).frame(0);
-        assert!(empty.as_chunks::<3>().0.iter().all(|p| *p == [10, 200, 30]));
+        for row in picture.as_chunks::<3>().0.chunks(32) {
+            assert_eq!((row[19], row[21]), ([255; 3], [10, 200, 30]));
+            // Half of 16 samples see the triangle, half the background.
+            assert_eq!(row[20], [133, 228, 143]);
+        }
     }
 }
