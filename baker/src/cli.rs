@@ -88,7 +88,7 @@ pub struct Bake {
     /// Writes bytes, seconds, quality and warnings as JSON.
     #[arg(long, value_name = "FILE.json")]
     pub report: Option<PathBuf>,
-    /// Writes pictures: the source image with the charts' borders, the covered texels, three frames exact and played.
+    /// Writes pictures: the source image with the charts' borders, the covered texels, three frames and the worst one, exact and played.
     #[arg(long, value_name = "DIR")]
     pub diagnostics: Option<PathBuf>,
     /// Frames compared with the antialiased scene: a number (evenly spread over the path), all, or none.

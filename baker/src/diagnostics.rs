@@ -16,7 +16,7 @@ const GAIN: u8 = 4;
 /// The colour of the charts' borders.
 const BORDER: [u8; 3] = [255, 0, 255];
 
-/// Writes into `folder`: source-image.png, mask.png, and for three frames frame-NNNN-exact.png, frame-NNNN-played.png and
+/// Writes into `folder`: source-image.png, mask.png, and for three frames and the worst one frame-NNNN-exact.png, frame-NNNN-played.png and
 /// frame-NNNN-compare.png (exact, played, their difference four times as strong).
 pub fn write(folder: &Path, baked: &Baked) -> Result<()> {
     let image = &baked.flat.atlas.image;
@@ -25,7 +25,11 @@ pub fn write(folder: &Path, baked: &Baked) -> Result<()> {
     write_png(&folder.join("mask.png"), image.width, &mask)?;
     let gbuffer = &baked.flat.atlas.gbuffer;
     let mut result = Ok(());
-    verify::play(&baked.bundle, &spread(gbuffer.frames, FRAMES), |frame, played| {
+    let mut frames = spread(gbuffer.frames, FRAMES);
+    frames.push(baked.report.quality.worst_frame);
+    frames.sort_unstable();
+    frames.dedup();
+    verify::play(&baked.bundle, &frames, |frame, played| {
         let name = |kind: &str| folder.join(format!("frame-{frame:04}-{kind}.png"));
         let write = || {
             let exact = verify::exact_frame(&baked.flat.atlas, frame);

@@ -281,7 +281,10 @@ pub fn table(report: &Report) -> Vec<(String, String)> {
     row("bundle", format!("{} bytes: {:.1} a frame", grouped(bytes.bundle), bytes.per_frame));
     row(
         "PSNR",
-        format!("{:.2} dB mean, {:.2} dB worst frame; bilinear {:.2} dB", quality.psnr_mean, quality.psnr_min, quality.psnr_bilinear),
+        format!(
+            "{:.2} dB mean, {:.2} dB at worst (frame {}); bilinear {:.2} dB",
+            quality.psnr_mean, quality.psnr_min, quality.worst_frame, quality.psnr_bilinear
+        ),
     );
     row("SSIM", format!("{:.4}", quality.ssim_mean));
     row("wrong surface", format!("{:.3} % of the pixels", quality.wrong_surface_percent));

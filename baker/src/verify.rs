@@ -56,6 +56,8 @@ pub struct Quality {
     pub psnr_mean: f64,
     /// The worst frame's, dB.
     pub psnr_min: f64,
+    /// The first frame of that PSNR.
+    pub worst_frame: u32,
     /// Mean of the frames' SSIM.
     pub ssim_mean: f64,
     /// Mean of the frames' PSNR where both sides look the source image up bilinearly, dB: what the paths alone cost.
@@ -241,10 +243,12 @@ pub fn against_exact(bytes: &[u8], atlas: &Atlas, progress: &(dyn Fn(u32, u32) +
     runs.iter().for_each(|run| path.merge(&run.path));
     let all = |list: fn(&Sums) -> &Vec<f64>| runs.iter().flat_map(list).copied();
     let mean = |list: fn(&Sums) -> &Vec<f64>| all(list).sum::<f64>() / f64::from(gbuffer.frames.max(1));
+    let (worst_frame, psnr_min) = (0..).zip(all(|run| &run.psnr)).min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, metrics::PERFECT));
     let wrong: u64 = runs.iter().map(|run| run.wrong).sum();
     Ok(Quality {
         psnr_mean: mean(|run| &run.psnr),
-        psnr_min: all(|run| &run.psnr).fold(metrics::PERFECT, f64::min),
+        psnr_min,
+        worst_frame,
         ssim_mean: mean(|run| &run.ssim),
         psnr_bilinear: mean(|run| &run.bilinear),
         wrong_surface_percent: 100.0 * wrong as f64 / gbuffer.label.len().max(1) as f64,
