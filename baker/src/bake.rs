@@ -47,7 +47,7 @@ pub enum BakeError {
         smallest: u64,
     },
     /// No bundle that a search found reaches the quality.
-    #[error("--psnr: found at most {nearest:.2} dB, expected {asked:.2} dB; ask for less, or lower --cell or --density")]
+    #[error("--psnr: found at most {nearest:.2} dB, expected {asked:.2} dB; ask for less, and leave --cell and --key-interval to the search")]
     Psnr {
         /// The mean PSNR asked for, dB.
         asked: f64,

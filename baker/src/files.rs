@@ -1,11 +1,12 @@
 //! Files that are written whole or not at all, also when the program is interrupted.
 //! Bytes and pictures come in; they go to a temporary file in the target's own folder, which is renamed when it is complete.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use tempfile::NamedTempFile;
 
 /// Temporary files that are being written.
 static OPEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
@@ -40,28 +41,40 @@ impl Drop for Listed {
     }
 }
 
-/// Writes `path` through `fill`; folders on the way are made. When `fill` fails, `path` stays as it was.
-///
-/// # Errors
-/// What `fill` says, or the path and why it cannot be written.
-pub fn write_with(path: &Path, fill: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
+/// Makes the folder of `path` and a temporary file in it, which is on the list for as long as the second value lives.
+fn begin(path: &Path) -> Result<(NamedTempFile, Listed)> {
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
     std::fs::create_dir_all(folder).with_context(|| format!("{}: the folder cannot be made", folder.display()))?;
+    ensure!(!path.is_dir(), "{}: expected a file's name, found a folder; add a name", path.display());
     let mut builder = tempfile::Builder::new();
     builder.prefix(".cubist-").suffix(".tmp");
     // A temporary file is private by default; the finished one follows the user's umask like any other.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let (file, _listed) = {
-        let mut list = open();
-        let file = builder.tempfile_in(folder).with_context(|| format!("{}: the folder cannot be written to", folder.display()))?;
-        list.push(file.path().to_owned());
-        let listed = Listed(file.path().to_owned());
-        (file, listed)
-    };
+    let mut list = open();
+    let file = builder.tempfile_in(folder).with_context(|| format!("{}: the folder cannot be written to", folder.display()))?;
+    list.push(file.path().to_owned());
+    let listed = Listed(file.path().to_owned());
+    Ok((file, listed))
+}
+
+/// Says now, before long work, if `path` could not be written after it.
+///
+/// # Errors
+/// The path and why it cannot be written.
+pub fn check(path: &Path) -> Result<()> {
+    begin(path).map(drop)
+}
+
+/// Writes `path` through `fill`; folders on the way are made. When `fill` fails, `path` stays as it was.
+///
+/// # Errors
+/// What `fill` says, or the path and why it cannot be written.
+pub fn write_with(path: &Path, fill: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
+    let (file, _listed) = begin(path)?;
     let mut writer = BufWriter::new(file);
     fill(&mut writer)?;
     let file = writer.into_inner().map_err(|e| e.into_error()).with_context(|| format!("{}: writing failed", path.display()))?;
@@ -130,5 +143,9 @@ mod tests {
         std::fs::write(&file, "x").unwrap();
         let error = write_png(&file.join("a.png"), 1, &[0; 3]).unwrap_err();
         assert!(error.to_string().contains("plain: the folder cannot be made"), "{error:#}");
+        let error = check(dir.path()).unwrap_err();
+        assert!(error.to_string().contains("found a folder"), "{error:#}");
+        check(&dir.path().join("new.bin")).unwrap();
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 1, "a check leaves nothing behind");
     }
 }

@@ -40,6 +40,10 @@ fn main() -> ExitCode {
 fn bake(name: &str, output: &Path, args: &Bake) -> Result<()> {
     files::clean_up_when_interrupted()?;
     threads(args.threads)?;
+    files::check(output)?;
+    if let Some(path) = &args.report {
+        files::check(path)?;
+    }
     let start = Instant::now();
     let scene = load(name, &args.playback)?;
     let options = args.options(start.elapsed().as_secs_f64());
