@@ -2,7 +2,7 @@
 //! Bytes come from a file or the encoder; figures go to `cubist-bake inspect` and to the report's byte counts.
 
 use cubist_core::fixed::KEY_BITS;
-use cubist_core::format::{ATLAS, FIXED, INFO, LABELS, MASK, MASKED, PATH, TIME_HOLD, TIME_LINEAR, VERSION};
+use cubist_core::format::{ATLAS, FIXED, INFO, LABELS, MASK, MASKED, PATH, STRIP, TIME_HOLD, TIME_LINEAR, VERSION};
 use cubist_core::{Bundle, BundleError};
 use serde::Serialize;
 
@@ -39,6 +39,8 @@ pub struct LabelInfo {
     pub rect: [u16; 4],
     /// Its chart does not fill its rectangle.
     pub masked: bool,
+    /// Its outline is told by two distances, from opposite sides, not by one.
+    pub strip: bool,
     /// An affine function of the screen position: the background.
     pub fixed: bool,
     /// Where the screen's top left pixel centre falls, texels; for fixed labels.
@@ -100,6 +102,8 @@ pub struct LimitsInfo {
     pub cell_sheets: u8,
     /// Keys that one seek decodes.
     pub seek_keys: u16,
+    /// Distances from outlines that a layer carries.
+    pub fields: u8,
 }
 
 /// Everything there is to say about a bundle without playing it.
@@ -211,6 +215,7 @@ impl Inspection {
                 row_sheets: limits.row_sheets,
                 cell_sheets: limits.cell_sheets,
                 seek_keys: limits.seek_keys,
+                fields: limits.fields,
             },
             info: find(INFO).map(|text| String::from_utf8_lossy(text).into_owned()),
         })
@@ -290,15 +295,16 @@ impl Inspection {
                 _ => String::new(),
             };
             line(format!(
-                "      label {index:>3}  {x0:>4}..{x1:<4} x {y0:>4}..{y1:<4}{}{fixed}",
-                if label.masked { "  masked" } else { "" }
+                "      label {index:>3}  {x0:>4}..{x1:<4} x {y0:>4}..{y1:<4}{}{}{fixed}",
+                if label.masked { "  masked" } else { "" },
+                if label.strip { "  strip" } else { "" }
             ));
         }
         let l = &self.limits;
         line(format!("Memory  {} bytes of working memory and a row of {} bytes", self.workspace, width * 2));
         line(format!(
-            "Limits  a key: {} layers, {} bytes of sheet lists; a row: {} layers, {} sheets; a cell: {} sheets; a seek: {} keys",
-            l.key_layers, l.list_bytes, l.row_layers, l.row_sheets, l.cell_sheets, l.seek_keys
+            "Limits  a key: {} layers, {} bytes of sheet lists; a row: {} layers, {} sheets; a cell: {} sheets; a layer: {} fields; a seek: {} keys",
+            l.key_layers, l.list_bytes, l.row_layers, l.row_sheets, l.cell_sheets, l.fields, l.seek_keys
         ));
         out
     }
@@ -316,6 +322,7 @@ fn label_info(bundle: &Bundle<'_>, label: u8) -> LabelInfo {
     LabelInfo {
         rect: [record.left, record.top, record.right, record.bottom],
         masked: record.flags & MASKED != 0,
+        strip: record.flags & STRIP != 0,
         fixed,
         origin: fixed.then(|| [scaled(record.origin_u, KEY_BITS), scaled(record.origin_v, KEY_BITS)]),
         step: fixed.then(|| [scaled(record.step_u, 14), scaled(record.step_v, 14)]),

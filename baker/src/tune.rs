@@ -340,8 +340,8 @@ impl Samples {
 fn scattered(frames: u32) -> Vec<u32> {
     // Multiples of the golden ratio modulo 1 spread best; 0.618.. as a 32-bit fraction.
     const GOLDEN: u64 = 2_654_435_769;
-    let mut out: Vec<u32> =
-        (0..u64::from(SAMPLES)).map(|i| ((((2 * i + 1) * GOLDEN / 2) & 0xffff_ffff) * u64::from(frames) >> 32) as u32).collect();
+    let place = |i: u64| (((2 * i + 1) * GOLDEN / 2) & 0xffff_ffff) * u64::from(frames);
+    let mut out: Vec<u32> = (0..u64::from(SAMPLES)).map(|i| (place(i) >> 32) as u32).collect();
     out.sort_unstable();
     out.dedup();
     out
