@@ -1,7 +1,7 @@
 //! From a G-buffer to bytes to pixels: two sheets, one moving in front of the other.
 
 use cubist_baker::atlas::{Label, SourceImage};
-use cubist_baker::encode::{self, CodingSettings, Frame as Header};
+use cubist_baker::encode::{self, CodingSettings, Content, Frame as Header};
 use cubist_baker::gbuffer::GBuffer;
 use cubist_baker::sheets::{self, KeyGrid, Layers};
 use cubist_baker::{fields, fit, order};
@@ -51,7 +51,8 @@ fn bake(gbuffer: &GBuffer, image: &SourceImage, looping: bool, independent_every
     evidence.fields = Some(&fields);
     order::sort(&evidence, &mut sheets);
     let settings = CodingSettings { step_log2: 0, lambda: 0.0, independent_every };
-    encode::bundle(gbuffer, &grid, image, &sheets, &layers, &fit, &fields, settings, Header { fps: 30, info: "two sheets" })
+    let content = Content { gbuffer, grid: &grid, image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields };
+    encode::bundle(&content, settings, Header { fps: 30, info: "two sheets" })
 }
 
 fn play(bytes: &[u8], frames: impl Iterator<Item = u32>) -> Vec<Vec<u16>> {
