@@ -54,7 +54,8 @@ impl<'m> Lists<'m> {
         match self.data.get_mut(end..next).and_then(<[u8]>::split_first_mut) {
             Some((count, labels)) => {
                 *count = sheets.len() as u8;
-                labels.copy_from_slice(sheets);
+                // Not copy_from_slice: its check of the lengths would be the crate's one path to a panic.
+                labels.iter_mut().zip(sheets).for_each(|(slot, &label)| *slot = label);
                 next
             }
             // A list that breaks its own bound is cut off: the cells after it show nothing.
