@@ -29,11 +29,14 @@ struct Cutter<'m> {
 
 impl<'m> Cutter<'m> {
     fn take<T: Pod>(&mut self, count: usize) -> &'m mut [T] {
-        let words = count.saturating_mul(size_of::<T>()).div_ceil(4);
+        let bytes = count.saturating_mul(size_of::<T>());
+        let words = bytes.div_ceil(4);
         self.words = self.words.saturating_add(words);
         let Some((head, rest)) = core::mem::take(&mut self.rest).split_at_mut_checked(words) else { return &mut [] };
         self.rest = rest;
-        bytemuck::try_cast_slice_mut(head).unwrap_or(&mut []).get_mut(..count).unwrap_or(&mut [])
+        // Whole words hold a whole number of most types, but not of all: the rest is left over.
+        let exact = bytemuck::try_cast_slice_mut(head).unwrap_or(&mut []).get_mut(..bytes).unwrap_or(&mut []);
+        bytemuck::try_cast_slice_mut::<u8, T>(exact).unwrap_or(&mut [])
     }
 }
 
