@@ -8,7 +8,6 @@ use crate::format::{
     MAX_SECTIONS, MAX_SHEETS, PATH, Path, Section, TIME_LINEAR, VERSION,
 };
 use crate::grid::Grid;
-use crate::memory;
 use heapless::Vec;
 
 /// A parsed bundle: cheap to copy around by reference, borrowing everything from the bytes.
@@ -92,12 +91,6 @@ impl<'a> Bundle<'a> {
     #[must_use]
     pub fn looping(&self) -> bool {
         self.path.looping
-    }
-
-    /// Bytes of working memory that a player of this bundle asks for.
-    #[must_use]
-    pub fn memory_needed(&self) -> usize {
-        memory::needed(self)
     }
 
     /// The bounds on memory and work that the bundle states.

@@ -66,11 +66,14 @@ fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
     }
 }
 
-/// Bytes that a player of `bundle` needs, at any alignment.
-pub fn needed(bundle: &Bundle<'_>) -> usize {
-    let mut counter = Cutter { rest: &mut [], words: 0 };
-    let _ = cut(bundle, &mut counter);
-    counter.words.saturating_mul(4).saturating_add(3)
+impl Bundle<'_> {
+    /// Bytes of working memory that a player of this bundle asks for, at any alignment.
+    #[must_use]
+    pub fn memory_needed(&self) -> usize {
+        let mut counter = Cutter { rest: &mut [], words: 0 };
+        let _ = cut(self, &mut counter);
+        counter.words.saturating_mul(4).saturating_add(3)
+    }
 }
 
 /// `memory` cut up for `bundle`; `None` where it is too small.
