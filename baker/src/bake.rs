@@ -8,6 +8,7 @@ use crate::scene::Scene;
 use crate::sheets::{self, KeyGrid, Layers};
 use crate::trace::Tracer;
 use crate::{fit, order};
+use cubist_core::format::TIME_CUBIC;
 use std::time::Instant;
 use thiserror::Error;
 
@@ -47,6 +48,8 @@ pub struct Settings {
     pub cell: u32,
     /// Frames between keys.
     pub key_interval: u32,
+    /// How layers are interpolated between keys: one of the format's `TIME_` numbers.
+    pub time: u8,
     /// The source image.
     pub atlas: atlas::Settings,
     /// The keys.
@@ -60,6 +63,7 @@ impl Default for Settings {
         Self {
             cell: 8,
             key_interval: 8,
+            time: TIME_CUBIC,
             atlas: atlas::Settings::default(),
             coding: CodingSettings { step_log2: 1, lambda: 0.05, independent_every: 16 },
             least_pixels: 4,
@@ -120,7 +124,7 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     }
     let start = Instant::now();
     let Atlas { image, gbuffer, .. } = &flat.atlas;
-    let grid = KeyGrid::new(gbuffer, settings.cell.trailing_zeros() as u8, settings.key_interval, scene.playback.looping);
+    let grid = KeyGrid::new(gbuffer, settings.cell.trailing_zeros() as u8, settings.key_interval, scene.playback.looping, settings.time);
     progress("finding sheets", 0.0);
     let mut sheets = sheets::find(gbuffer, &grid, settings.least_pixels);
     let layers = Layers::of(&grid, &sheets);

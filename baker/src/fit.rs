@@ -5,7 +5,7 @@
 //! positions: those that continue the visible part of their sheet best.
 
 use crate::gbuffer::GBuffer;
-use crate::sheets::{KeyGrid, Layers, Sheets};
+use crate::sheets::{Chain, KeyGrid, Layers, Sheets, bilinear};
 use rayon::prelude::*;
 
 /// Weight of the second differences inside a cell, per pixel: keeps sheets that few pixels pin down flat.
@@ -15,14 +15,32 @@ const GRADIENT: f32 = 1e-7;
 /// Conjugate gradient steps. Cells are small and overlap: 50 steps settle below 1/64 texel.
 const STEPS: usize = 60;
 
-/// A cell's corner weights: index bit 0 across, bit 1 down, bit 2 in time.
-type Corners<T> = [T; 8];
+/// Unknowns of a sheet in a cell and interval: four corners times four keys.
+const UNKNOWNS: usize = 16;
 
-/// The normal equations of one sheet in one cell and interval.
+/// The normal equations of one sheet in one cell and interval, for two quantities side by side.
 struct Element {
-    layer: Corners<u32>,
-    matrix: Corners<Corners<f32>>,
-    right: Corners<[f32; 2]>,
+    /// The layer of corner c and key k at index 4 c + k; where there is none, one with weight zero.
+    layer: [u32; UNKNOWNS],
+    matrix: [[f32; UNKNOWNS]; UNKNOWNS],
+    right: [[f32; 2]; UNKNOWNS],
+    /// Sum of the weights and weighted targets of its pixels.
+    seen: [f64; 3],
+}
+
+/// What one fit is about.
+pub struct Problem<'a, T> {
+    /// The grid.
+    pub grid: &'a KeyGrid,
+    /// The sheets to fit.
+    pub sheets: &'a Sheets,
+    /// The layers they share.
+    pub layers: &'a Layers,
+    /// How layers are interpolated in time.
+    pub time: u8,
+    /// The target and weight of a G-buffer pixel for the sheet at a place in the list of its cell (interval times cells plus cell);
+    /// `None`: the sheet does not care.
+    pub target: T,
 }
 
 /// Fitted positions.
@@ -34,89 +52,147 @@ pub struct Fit {
     pub weight: Vec<f32>,
 }
 
-/// Trilinear weights of the corners at a position in a cell.
-fn hat([x, y, t]: [f32; 3]) -> Corners<f32> {
-    std::array::from_fn(|corner| {
-        let side = |bit: usize, at: f32| if corner & bit != 0 { at } else { 1.0 - at };
-        side(1, x) * side(2, y) * side(4, t)
-    })
-}
-
-/// The regulariser of a cell of `volume` pixels: squared differences of order one to three over its corners.
-fn regulariser(volume: f32) -> Corners<Corners<f32>> {
-    let mut matrix = [[0.0; 8]; 8];
+/// The regulariser of a cell of `volume` pixels: squared differences of order one to three over its corners in space and time.
+fn regulariser(volume: f32, matrix: &mut [[f32; UNKNOWNS]; UNKNOWNS]) {
+    // Corner bits: across, down, in time; the interval's keys are the second and third of each chain.
+    let unknown = |corner: usize| (corner & 3) * 4 + 1 + (corner >> 2);
     for difference in 1..8usize {
         let weight = volume * if difference.count_ones() >= 2 { TWIST } else { GRADIENT } / 8.0;
         let sign = |corner: usize| if (corner & difference).count_ones() % 2 == 1 { -1.0 } else { 1.0 };
-        for (a, row) in matrix.iter_mut().enumerate() {
-            for (b, entry) in row.iter_mut().enumerate() {
-                *entry += weight * sign(a) * sign(b);
+        for a in 0..8 {
+            for b in 0..8 {
+                matrix[unknown(a)][unknown(b)] += weight * sign(a) * sign(b);
             }
         }
     }
-    matrix
 }
 
-/// Fits all layers.
+/// Fits the positions of all layers.
 #[must_use]
 pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers) -> Fit {
-    let elements = assemble(gbuffer, grid, sheets, layers);
-    let start = initial(&elements, layers.label.len());
+    let target = |index: usize, sheet: usize, pixel: usize| {
+        let own = gbuffer.label[pixel] == u16::from(sheets.lists[index][sheet]);
+        own.then(|| (gbuffer.uv[pixel], 1.0))
+    };
+    solve_for(&Problem { grid, sheets, layers, time: grid.time, target })
+}
+
+/// Fits two quantities of all layers to the targets of `problem`.
+#[must_use]
+pub fn solve_for<T>(problem: &Problem<'_, T>) -> Fit
+where
+    T: Fn(usize, usize, usize) -> Option<([f32; 2], f32)> + Sync,
+{
+    let elements = assemble(problem);
+    let start = initial(&elements, problem.layers.label.len());
     conjugate_gradients(&elements, start)
 }
 
-fn assemble(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers) -> Vec<Element> {
-    let (cells, nodes) = (grid.grid.cells(), grid.grid.nodes());
-    let per_cell: Vec<Vec<Element>> = sheets
+fn assemble<T>(problem: &Problem<'_, T>) -> Vec<Element>
+where
+    T: Fn(usize, usize, usize) -> Option<([f32; 2], f32)> + Sync,
+{
+    let grid = problem.grid;
+    let cells = grid.grid.cells();
+    let per_cell: Vec<Vec<Element>> = problem
+        .sheets
         .lists
         .par_iter()
         .enumerate()
         .map(|(index, list)| {
             let (interval, cell) = (index / cells, index % cells);
             let [columns, rows] = grid.pixels(cell);
-            let volume = columns.len() * rows.len() * grid.frames_of(interval).len();
-            let corners = grid.corners(cell);
-            let mut elements: Vec<Element> = list
-                .iter()
-                .map(|&label| Element {
-                    layer: std::array::from_fn(|corner| {
-                        let key = if corner & 4 == 0 { interval } else { grid.second_key(interval) };
-                        let layer = layers.find(key * nodes + corners[corner & 3], label);
-                        layer.map_or(u32::MAX, |layer| layer as u32)
-                    }),
-                    matrix: regulariser(volume as f32),
-                    right: [[0.0; 2]; 8],
-                })
-                .collect();
-            grid.each_pixel(interval, cell, |pixel, at| {
-                let label = gbuffer.label[pixel] as u8;
-                let Some(element) = list.iter().position(|&l| l == label).map(|sheet| &mut elements[sheet]) else { return };
-                let (weights, uv) = (hat(at), gbuffer.uv[pixel]);
-                for (a, row) in element.matrix.iter_mut().enumerate() {
-                    for (b, entry) in row.iter_mut().enumerate() {
-                        *entry += weights[a] * weights[b];
+            let volume = (columns.len() * rows.len() * grid.frames_of(interval).len()) as f32;
+            let chains: Vec<[Chain; 4]> =
+                list.iter().map(|&label| problem.layers.chains(grid, interval, cell, label, problem.time)).collect();
+            let mut elements: Vec<Element> = chains.iter().map(|chains| Element::new(chains, volume)).collect();
+            for frame in grid.frames_of(interval) {
+                let weights = grid.weights(interval, frame, problem.time);
+                // Within a frame only the corners' weights change from pixel to pixel: the keys' come in once.
+                let mut sums = vec![FrameSums::default(); list.len()];
+                grid.each_pixel(frame, cell, |pixel, at| {
+                    let corner = bilinear(at);
+                    for (sheet, sums) in sums.iter_mut().enumerate() {
+                        if let Some((target, weight)) = (problem.target)(index, sheet, pixel) {
+                            sums.add(corner, target, weight);
+                        }
                     }
-                    element.right[a][0] += weights[a] * uv[0];
-                    element.right[a][1] += weights[a] * uv[1];
+                });
+                for ((element, sums), chains) in elements.iter_mut().zip(&sums).zip(&chains) {
+                    element.add(sums, &chains.map(|chain| chain.weights(&weights)));
                 }
-            });
+            }
             elements
         })
         .collect();
     per_cell.into_iter().flatten().collect()
 }
 
-/// Every layer at the mean of its sheets' seen positions, to start from.
+/// Sums over the pixels that a sheet shows in one frame of a cell, by corners.
+#[derive(Clone, Copy, Default)]
+struct FrameSums {
+    matrix: [[f32; 4]; 4],
+    right: [[f32; 2]; 4],
+    seen: [f32; 3],
+}
+
+impl FrameSums {
+    fn add(&mut self, corner: [f32; 4], [u, v]: [f32; 2], weight: f32) {
+        for (a, (row, right)) in self.matrix.iter_mut().zip(&mut self.right).enumerate() {
+            let scaled = weight * corner[a];
+            for (entry, b) in row.iter_mut().zip(corner) {
+                *entry += scaled * b;
+            }
+            right[0] += scaled * u;
+            right[1] += scaled * v;
+        }
+        self.seen = [self.seen[0] + weight * u, self.seen[1] + weight * v, self.seen[2] + weight];
+    }
+}
+
+impl Element {
+    fn new(chains: &[Chain; 4], volume: f32) -> Self {
+        let mut layer = [u32::MAX; UNKNOWNS];
+        for (corner, chain) in chains.iter().enumerate() {
+            // The sheet lists made the layers: the inner two are there.
+            let some = chain.layer[1].or(chain.layer[2]).unwrap_or(0);
+            for (key, index) in chain.layer.iter().enumerate() {
+                layer[corner * 4 + key] = index.unwrap_or(some) as u32;
+            }
+        }
+        let mut matrix = [[0.0; UNKNOWNS]; UNKNOWNS];
+        regulariser(volume, &mut matrix);
+        Self { layer, matrix, right: [[0.0; 2]; UNKNOWNS], seen: [0.0; 3] }
+    }
+
+    fn add(&mut self, sums: &FrameSums, keys: &[[f32; 4]; 4]) {
+        if sums.seen[2] == 0.0 {
+            return;
+        }
+        for (a, (row, right)) in self.matrix.iter_mut().zip(&mut self.right).enumerate() {
+            let weight = keys[a / 4][a % 4];
+            if weight == 0.0 {
+                continue;
+            }
+            for (b, entry) in row.iter_mut().enumerate() {
+                *entry += weight * keys[b / 4][b % 4] * sums.matrix[a / 4][b / 4];
+            }
+            right[0] += weight * sums.right[a / 4][0];
+            right[1] += weight * sums.right[a / 4][1];
+        }
+        for (sum, seen) in self.seen.iter_mut().zip(sums.seen) {
+            *sum += f64::from(seen);
+        }
+    }
+}
+
+/// Every layer at the mean of its sheets' targets, to start from.
 fn initial(elements: &[Element], layers: usize) -> Vec<[f64; 2]> {
     let mut sums = vec![[0.0f64; 3]; layers];
     for element in elements {
-        // The corner weights of a pixel sum to one: so do the columns of the matrix, regulariser aside.
-        let seen: f32 = element.matrix.iter().flatten().sum();
-        let total = |axis: usize| element.right.iter().map(|r| f64::from(r[axis])).sum::<f64>();
-        let sum = [total(0), total(1), f64::from(seen)];
         for &layer in &element.layer {
-            for (a, b) in sums[layer as usize].iter_mut().zip(sum) {
-                *a += b;
+            for (sum, seen) in sums[layer as usize].iter_mut().zip(element.seen) {
+                *sum += seen;
             }
         }
     }
@@ -127,7 +203,7 @@ fn initial(elements: &[Element], layers: usize) -> Vec<[f64; 2]> {
 fn multiply(elements: &[Element], x: &[[f64; 2]], y: &mut [[f64; 2]]) {
     y.fill([0.0; 2]);
     for element in elements {
-        let at: Corners<[f64; 2]> = element.layer.map(|layer| x[layer as usize]);
+        let at = element.layer.map(|layer| x[layer as usize]);
         for (row, &layer) in element.matrix.iter().zip(&element.layer) {
             let mut sum = [0.0; 2];
             for (&entry, value) in row.iter().zip(&at) {

@@ -4,7 +4,7 @@
 use crate::atlas::SourceImage;
 use crate::fit::Fit;
 use crate::gbuffer::GBuffer;
-use crate::sheets::{KeyGrid, Layers, Sheets};
+use crate::sheets::{Chain, KeyGrid, Layers, Sheets, bilinear};
 use rayon::prelude::*;
 
 /// Up to this many sheets every order is tried; more are ordered greedily, front to back.
@@ -48,40 +48,27 @@ fn observe(
     cell: usize,
     list: &[u8],
 ) -> Vec<Group> {
-    let nodes = grid.grid.nodes();
-    let corners = grid.corners(cell);
-    let positions: Vec<[[f32; 2]; 8]> = list
-        .iter()
-        .map(|&label| {
-            std::array::from_fn(|corner| {
-                let key = if corner & 4 == 0 { interval } else { grid.second_key(interval) };
-                layers.find(key * nodes + corners[corner & 3], label).map_or([0.0; 2], |layer| fit.uv[layer])
-            })
-        })
-        .collect();
+    let chains: Vec<[Chain; 4]> = list.iter().map(|&label| layers.chains(grid, interval, cell, label, grid.time)).collect();
     let mut groups: Vec<Group> = Vec::new();
-    grid.each_pixel(interval, cell, |pixel, at| {
-        let label = gbuffer.label[pixel] as u8;
-        let Some(sheet) = list.iter().position(|&l| l == label) else { return };
-        let mut covering = 0;
-        for (index, (&label, corners)) in list.iter().zip(&positions).enumerate() {
-            covering |= u32::from(covers(image, label, interpolate(corners, at))) << index;
-        }
-        match groups.iter_mut().find(|g| g.sheet == sheet && g.covering == covering) {
-            Some(group) => group.pixels += 1,
-            None => groups.push(Group { sheet, covering, pixels: 1 }),
-        }
-    });
+    for frame in grid.frames_of(interval) {
+        let weights = grid.weights(interval, frame, grid.time);
+        let corners: Vec<[[f32; 2]; 4]> = chains.iter().map(|chains| chains.map(|chain| chain.value(&fit.uv, &weights))).collect();
+        grid.each_pixel(frame, cell, |pixel, at| {
+            let label = gbuffer.label[pixel] as u8;
+            let Some(sheet) = list.iter().position(|&l| l == label) else { return };
+            let corner = bilinear(at);
+            let mut covering = 0;
+            for (index, (&label, values)) in list.iter().zip(&corners).enumerate() {
+                let uv = [0, 1].map(|axis| values.iter().zip(corner).map(|(value, weight)| value[axis] * weight).sum());
+                covering |= u32::from(covers(image, label, uv)) << index;
+            }
+            match groups.iter_mut().find(|g| g.sheet == sheet && g.covering == covering) {
+                Some(group) => group.pixels += 1,
+                None => groups.push(Group { sheet, covering, pixels: 1 }),
+            }
+        });
+    }
     groups
-}
-
-/// The position at `at` (across, down, in time; 0..=1) between eight corners, as the player interpolates: time first.
-#[must_use]
-pub fn interpolate(corners: &[[f32; 2]; 8], [x, y, t]: [f32; 3]) -> [f32; 2] {
-    let mix = |a: [f32; 2], b: [f32; 2], w: f32| [a[0] + (b[0] - a[0]) * w, a[1] + (b[1] - a[1]) * w];
-    let node = |corner: usize| mix(corners[corner], corners[corner + 4], t);
-    let (left, right) = (mix(node(0), node(2), y), mix(node(1), node(3), y));
-    mix(left, right, x)
 }
 
 /// The player's chart test.

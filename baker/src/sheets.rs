@@ -2,8 +2,9 @@
 //! From the G-buffer; `fit` gives every sheet's corners their positions, `order` sorts them front to back.
 
 use crate::gbuffer::GBuffer;
-use cubist_core::format::MAX_SHEETS;
+use cubist_core::format::{MAX_SHEETS, TIME_CUBIC};
 use cubist_core::grid::Grid;
+use cubist_core::timeline::weights;
 use rayon::prelude::*;
 
 /// The key-ray grid in space and time.
@@ -19,12 +20,14 @@ pub struct KeyGrid {
     pub frames: u32,
     /// The last interval leads back to the first key.
     pub looping: bool,
+    /// How layers are interpolated between keys: one of the format's `TIME_` numbers.
+    pub time: u8,
 }
 
 impl KeyGrid {
     /// Cells of 2^`cell_log2` pixels, keys every `interval` frames; without a loop the last key stands at the last frame.
     #[must_use]
-    pub fn new(gbuffer: &GBuffer, cell_log2: u8, interval: u32, looping: bool) -> Self {
+    pub fn new(gbuffer: &GBuffer, cell_log2: u8, interval: u32, looping: bool, time: u8) -> Self {
         let last = gbuffer.frames.saturating_sub(1);
         let mut keys: Vec<u32> = (0..gbuffer.frames).step_by(interval.max(1) as usize).collect();
         if !looping && keys.last() != Some(&last) {
@@ -36,7 +39,7 @@ impl KeyGrid {
         }
         let size = [gbuffer.width as usize, gbuffer.height as usize];
         let grid = Grid::new(gbuffer.width as u16, gbuffer.height as u16, cell_log2);
-        Self { grid, size, keys, frames: gbuffer.frames, looping }
+        Self { grid, size, keys, frames: gbuffer.frames, looping, time }
     }
 
     /// Key intervals: between each two keys, on a looping path also back to the first; a single key has one.
@@ -58,17 +61,39 @@ impl KeyGrid {
         self.keys[interval]..if last { self.frames } else { self.end(interval) }
     }
 
-    /// How far `frame` is into interval `interval`, 0..=1.
+    /// Frames of interval `interval`, counted around a loop; 0 where there is none.
     #[must_use]
-    pub fn fraction(&self, interval: usize, frame: u32) -> f32 {
-        let (start, end) = (self.keys[interval], self.end(interval));
-        if end == start { 0.0 } else { (frame - start) as f32 / (end - start) as f32 }
+    pub fn length(&self, interval: isize) -> u32 {
+        let count = self.intervals() as isize;
+        let index = if self.looping { interval.rem_euclid(count) } else { interval };
+        if (0..count).contains(&index) { self.end(index as usize) - self.keys[index as usize] } else { 0 }
     }
 
     /// The key at the end of interval `interval`.
     #[must_use]
     pub fn second_key(&self, interval: usize) -> usize {
         if self.keys.len() == 1 { 0 } else { (interval + 1) % self.keys.len() }
+    }
+
+    /// The keys around interval `interval`: before it, its two ends, after it; those that playback in `time` uses.
+    #[must_use]
+    pub fn keys_around(&self, interval: usize, time: u8) -> [Option<usize>; 4] {
+        let keys = self.keys.len() as isize;
+        let at = |offset: isize| {
+            let key = interval as isize + offset;
+            if self.looping { Some(key.rem_euclid(keys) as usize) } else { (0..keys).contains(&key).then_some(key as usize) }
+        };
+        let outer = |offset| if time == TIME_CUBIC { at(offset) } else { None };
+        [outer(-1), Some(interval), Some(self.second_key(interval)), outer(2)]
+    }
+
+    /// The weights of the keys around `frame` of interval `interval`, by which of the outer two are missing, as the player has them.
+    #[must_use]
+    pub fn weights(&self, interval: usize, frame: u32, time: u8) -> [[f32; 4]; 4] {
+        let at = interval as isize;
+        let lengths = [self.length(at - 1), self.length(at), self.length(at + 1)];
+        let one = cubist_core::fixed::ONE as f32;
+        weights(time, lengths, frame - self.keys[interval]).map(|set| set.map(|weight| weight as f32 / one))
     }
 
     /// Columns and rows of pixels of a cell, cut off at the screen's edge.
@@ -87,21 +112,24 @@ impl KeyGrid {
         [node, node + 1, node + width, node + width + 1]
     }
 
-    /// Calls `f` with the index into the G-buffer and the position in the cell (across, down, in time; 0..=1 each) of every
-    /// pixel that a cell shows in an interval.
-    pub fn each_pixel(&self, interval: usize, cell: usize, mut f: impl FnMut(usize, [f32; 3])) {
+    /// Calls `f` with the index into the G-buffer and the position in the cell (across and down, 0..1) of every pixel
+    /// that a cell shows in `frame`.
+    pub fn each_pixel(&self, frame: u32, cell: usize, mut f: impl FnMut(usize, [f32; 2])) {
         let [columns, rows] = self.pixels(cell);
         let scale = 1.0 / (1u32 << self.grid.log2) as f32;
-        for frame in self.frames_of(interval) {
-            let time = self.fraction(interval, frame);
-            for y in rows.clone() {
-                let row = (frame as usize * self.size[1] + y) * self.size[0];
-                for x in columns.clone() {
-                    f(row + x, [(x - columns.start) as f32 * scale, (y - rows.start) as f32 * scale, time]);
-                }
+        for y in rows.clone() {
+            let row = (frame as usize * self.size[1] + y) * self.size[0];
+            for x in columns.clone() {
+                f(row + x, [(x - columns.start) as f32 * scale, (y - rows.start) as f32 * scale]);
             }
         }
     }
+}
+
+/// Bilinear weights of a cell's corners at a position in it, 0..=1.
+#[must_use]
+pub fn bilinear([x, y]: [f32; 2]) -> [f32; 4] {
+    [(1.0 - x) * (1.0 - y), x * (1.0 - y), (1.0 - x) * y, x * y]
 }
 
 /// The sheets of every cell and interval, interval-major; labels, most seen last.
@@ -121,13 +149,15 @@ pub fn find(gbuffer: &GBuffer, grid: &KeyGrid, least: u32) -> Sheets {
         .into_par_iter()
         .map(|index| {
             let mut counts: Vec<(u8, u32)> = Vec::new();
-            grid.each_pixel(index / cells, index % cells, |pixel, _| {
-                let label = gbuffer.label[pixel] as u8;
-                match counts.iter_mut().find(|(l, _)| *l == label) {
-                    Some((_, count)) => *count += 1,
-                    None => counts.push((label, 1)),
-                }
-            });
+            for frame in grid.frames_of(index / cells) {
+                grid.each_pixel(frame, index % cells, |pixel, _| {
+                    let label = gbuffer.label[pixel] as u8;
+                    match counts.iter_mut().find(|(l, _)| *l == label) {
+                        Some((_, count)) => *count += 1,
+                        None => counts.push((label, 1)),
+                    }
+                });
+            }
             // Most seen first, ties by label: what is cut off is the least.
             counts.sort_by_key(|&(label, count)| (std::cmp::Reverse(count), label));
             let kept = counts.iter().take(MAX_SHEETS).take_while(|&&(_, count)| count >= least).count().max(1);
@@ -176,10 +206,46 @@ impl Layers {
         layers
     }
 
-    /// The index of the layer of `label` at node `node` of key `key`, `nodes` nodes a key.
+    /// The index of the layer of `label` at `key_node`: the key times the nodes of the grid, plus the node.
     #[must_use]
     pub fn find(&self, key_node: usize, label: u8) -> Option<usize> {
         let (from, to) = (self.start[key_node] as usize, self.start[key_node + 1] as usize);
         self.label[from..to].binary_search(&label).ok().map(|at| from + at)
+    }
+
+    /// The chains of a sheet: for each corner of its cell its layers in the keys around the interval.
+    #[must_use]
+    pub fn chains(&self, grid: &KeyGrid, interval: usize, cell: usize, label: u8, time: u8) -> [Chain; 4] {
+        let nodes = grid.grid.nodes();
+        let keys = grid.keys_around(interval, time);
+        grid.corners(cell).map(|node| Chain { layer: keys.map(|key| key.and_then(|key| self.find(key * nodes + node, label))) })
+    }
+}
+
+/// One corner of a sheet over time: its layers in the keys before the interval, at its two ends and after it.
+#[derive(Clone, Copy, Debug)]
+pub struct Chain {
+    /// Indices of layers; the inner two are always there.
+    pub layer: [Option<usize>; 4],
+}
+
+impl Chain {
+    /// The weights of the chain's layers, out of those that [`KeyGrid::weights`] gives.
+    #[must_use]
+    pub fn weights(&self, set: &[[f32; 4]; 4]) -> [f32; 4] {
+        set[usize::from(self.layer[0].is_none()) | usize::from(self.layer[3].is_none()) << 1]
+    }
+
+    /// The chain's value, given its layers' `values` and the weights.
+    #[must_use]
+    pub fn value(&self, values: &[[f32; 2]], set: &[[f32; 4]; 4]) -> [f32; 2] {
+        let mut sum = [0.0; 2];
+        for (layer, weight) in self.layer.iter().zip(self.weights(set)) {
+            if let Some(layer) = layer {
+                sum[0] += weight * values[*layer][0];
+                sum[1] += weight * values[*layer][1];
+            }
+        }
+        sum
     }
 }

@@ -5,6 +5,7 @@ use cubist_baker::encode::{self, CodingSettings, Frame as Header};
 use cubist_baker::gbuffer::GBuffer;
 use cubist_baker::sheets::{self, KeyGrid, Layers};
 use cubist_baker::{fit, order};
+use cubist_core::format::{TIME_CUBIC, TIME_LINEAR};
 use cubist_core::{Bundle, Frame, Player};
 
 const SIZE: [u32; 2] = [100, 60];
@@ -37,8 +38,8 @@ fn gbuffer(looping: bool) -> (GBuffer, SourceImage) {
     (gbuffer, image)
 }
 
-fn bake(gbuffer: &GBuffer, image: &SourceImage, looping: bool, independent_every: usize) -> Vec<u8> {
-    let grid = KeyGrid::new(gbuffer, 3, 8, looping);
+fn bake(gbuffer: &GBuffer, image: &SourceImage, looping: bool, independent_every: usize, time: u8) -> Vec<u8> {
+    let grid = KeyGrid::new(gbuffer, 3, 8, looping, time);
     let mut sheets = sheets::find(gbuffer, &grid, 1);
     let layers = Layers::of(&grid, &sheets);
     let fit = fit::solve(gbuffer, &grid, &sheets, &layers);
@@ -76,7 +77,7 @@ fn agreement(gbuffer: &GBuffer, image: &SourceImage, frames: &[Vec<u16>]) -> f64
 #[test]
 fn straight_motion_plays_back_nearly_exactly() {
     let (gbuffer, image) = gbuffer(false);
-    let bytes = bake(&gbuffer, &image, false, 16);
+    let bytes = bake(&gbuffer, &image, false, 16, TIME_CUBIC);
     let share = agreement(&gbuffer, &image, &play(&bytes, 0..FRAMES));
     // What differs lies within 1/128 texel of a texel's edge, or of the board's.
     assert!(share > 0.97, "{share}");
@@ -84,9 +85,9 @@ fn straight_motion_plays_back_nearly_exactly() {
 
 #[test]
 fn any_frame_is_the_same_whatever_was_shown_before() {
-    for looping in [false, true] {
+    for (looping, time) in [(false, TIME_LINEAR), (true, TIME_LINEAR), (false, TIME_CUBIC), (true, TIME_CUBIC)] {
         let (gbuffer, image) = gbuffer(looping);
-        let bytes = bake(&gbuffer, &image, looping, 2);
+        let bytes = bake(&gbuffer, &image, looping, 2, time);
         let straight = play(&bytes, 0..FRAMES);
         let order: Vec<u32> = (0..200).map(|i| i * 17 % FRAMES).collect();
         for (picture, &frame) in play(&bytes, order.iter().copied()).iter().zip(&order) {
@@ -98,8 +99,8 @@ fn any_frame_is_the_same_whatever_was_shown_before() {
 #[test]
 fn the_number_of_independent_keys_does_not_change_the_picture() {
     let (gbuffer, image) = gbuffer(true);
-    let one = bake(&gbuffer, &image, true, 100);
-    let all = bake(&gbuffer, &image, true, 1);
+    let one = bake(&gbuffer, &image, true, 100, TIME_CUBIC);
+    let all = bake(&gbuffer, &image, true, 1, TIME_CUBIC);
     assert!(one.len() < all.len());
     assert!(play(&one, 0..FRAMES) == play(&all, 0..FRAMES));
 }

@@ -5,7 +5,7 @@ use crate::BundleError;
 use crate::atlas::Texture;
 use crate::format::{
     self, ATLAS, Atlas, Envelope, FIXED, INFO, KEY_BYTES, KNOWN_FLAGS, KeyEntry, LABEL_BYTES, LABELS, LabelRecord, MAGIC, MASK, MASKED,
-    MAX_SECTIONS, MAX_SHEETS, PATH, Path, Section, TIME_LINEAR, VERSION,
+    MAX_SECTIONS, MAX_SHEETS, PATH, Path, Section, TIME_CUBIC, VERSION,
 };
 use crate::grid::Grid;
 use heapless::Vec;
@@ -214,7 +214,7 @@ fn check_path<'a>(path: &Path<'a>) -> Result<&'a [[u8; KEY_BYTES]], BundleError>
     field((1..1 << 24).contains(&path.frames), "PATH frames", path.frames)?;
     field(path.fps > 0, "PATH fps", u32::from(path.fps))?;
     field((2..=5).contains(&path.cell_log2), "PATH cell_log2", u32::from(path.cell_log2))?;
-    field(path.time <= TIME_LINEAR, "PATH time", u32::from(path.time))?;
+    field(path.time <= TIME_CUBIC, "PATH time", u32::from(path.time))?;
     field(path.step_log2 <= 4, "PATH step_log2", u32::from(path.step_log2))?;
     field((1..=MAX_SHEETS as u8).contains(&path.limits.cell_sheets), "PATH cell_sheets", u32::from(path.limits.cell_sheets))?;
     let (keys, rest) = path.table.as_chunks::<KEY_BYTES>();
@@ -230,8 +230,10 @@ fn check_path<'a>(path: &Path<'a>) -> Result<&'a [[u8; KEY_BYTES]], BundleError>
         }
         (frame, end) = (key.frame, key.end);
         run = if key.independent { 1 } else { run.saturating_add(1) };
-        // A seek decodes from an independent key up to the key after the frame.
-        field(run < u32::from(path.limits.seek_keys), "PATH seek_keys", u32::from(path.limits.seek_keys))?;
+        // A seek decodes from an independent key up to the last one that the frame needs.
+        let (back, ahead) = format::reach(path.time);
+        let most = run.saturating_add(back.saturating_add(ahead) as u32);
+        field(most <= u32::from(path.limits.seek_keys), "PATH seek_keys", u32::from(path.limits.seek_keys))?;
     }
     if !path.looping && frame != path.frames.saturating_sub(1) {
         return Err(BundleError::Key { key: keys.len() as u32 });

@@ -2,11 +2,12 @@
 //! their four corners. Keys and lists come from the caller's memory, spans go to `span`.
 
 use crate::atlas::Texture;
-use crate::fixed::{PlayUv, between, part};
+use crate::fixed::{KeyUv, PlayUv, blend, part};
 use crate::grid::Grid;
 use crate::key::Key;
 use crate::lists::Lists;
 use crate::span::Span;
+use crate::timeline::WeightSet;
 
 /// A layer at one moment.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
@@ -14,6 +15,36 @@ use crate::span::Span;
 pub struct Layer {
     u: i32,
     v: i32,
+}
+
+/// The keys around a moment.
+#[derive(Clone, Copy, Debug)]
+pub struct Around<'k, 'm> {
+    /// The key before the interval, where its time is cubic and there is one.
+    pub before: Option<&'k Key<'m>>,
+    /// The key at its start.
+    pub from: &'k Key<'m>,
+    /// The key at its end.
+    pub to: &'k Key<'m>,
+    /// The key after it.
+    pub after: Option<&'k Key<'m>>,
+}
+
+impl Around<'_, '_> {
+    /// The layer of `label` at `node`, whose indices in the interval's two keys are known.
+    fn blend(&self, node: usize, label: u8, [from, to]: [usize; 2], weights: &WeightSet) -> PlayUv {
+        let outer = |key: Option<&Key<'_>>| key.and_then(|key| Some(key.uv(key.find(node, label)?)));
+        let (before, after) = (outer(self.before), outer(self.after));
+        let [both, no_first, no_last, neither] = weights;
+        let weights = match (before, after) {
+            (Some(_), Some(_)) => both,
+            (None, Some(_)) => no_first,
+            (Some(_), None) => no_last,
+            (None, None) => neither,
+        };
+        let four = [before.unwrap_or_default(), self.from.uv(from), self.to.uv(to), after.unwrap_or_default()];
+        PlayUv { u: blend(four.map(KeyUv::u), *weights), v: blend(four.map(KeyUv::v), *weights) }
+    }
 }
 
 /// One row of nodes at one moment, in caller's memory.
@@ -28,9 +59,8 @@ pub struct NodeRow<'m> {
 }
 
 impl NodeRow<'_> {
-    /// Fills the row with the layers that both keys carry, `weight` (Q14) of the way between them. Returns how many there are.
-    pub fn fill(&mut self, grid: Grid, row: usize, keys: [&Key<'_>; 2], weight: i32, texture: &Texture<'_>) -> u32 {
-        let [from, to] = keys;
+    /// Fills the row with the layers that both ends of the interval carry, weighted. Returns how many there are.
+    pub fn fill(&mut self, grid: Grid, row: usize, keys: &Around<'_, '_>, weights: &WeightSet, texture: &Texture<'_>) -> u32 {
         let first = row.wrapping_mul(grid.node_columns());
         let mut count = 0usize;
         for column in 0..grid.node_columns() {
@@ -38,13 +68,12 @@ impl NodeRow<'_> {
                 *start = count as u16;
             }
             let node = first.wrapping_add(column);
-            let (mut index, labels) = from.node(node);
+            let (mut index, labels) = keys.from.node(node);
             for &label in labels {
-                if let Some(other) = to.find(node, label)
+                if let Some(other) = keys.to.find(node, label)
                     && let Some((slot, layer)) = self.label.get_mut(count).zip(self.layer.get_mut(count))
                 {
-                    let (a, b) = (from.uv(index), to.uv(other));
-                    let uv = texture.clamp(PlayUv { u: between(a.u(), b.u(), weight), v: between(a.v(), b.v(), weight) });
+                    let uv = texture.clamp(keys.blend(node, label, [index, other], weights));
                     *slot = label;
                     *layer = Layer { u: uv.u, v: uv.v };
                     count = count.wrapping_add(1);

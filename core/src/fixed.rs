@@ -44,17 +44,13 @@ pub struct PlayUv {
     pub v: i32,
 }
 
-/// The weights of up to four keys at one moment, Q14; they sum to [`ONE`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Weights(pub [i32; 4]);
-
-/// The value `weight` (Q14, 0..=[`ONE`]) of the way from `from` to `to` (Q10.6), in Q15.16,
-/// rounded to nearest, ties up; exact at both ends.
+/// The sum of `values` (Q10.6) times `weights` (Q14, summing to [`ONE`]), in Q15.16, rounded to nearest, ties up;
+/// exact where one weight is [`ONE`].
 #[must_use]
-#[expect(clippy::arithmetic_side_effects, reason = "from << 14 plus (to - from) * weight lies between two values below 2^30")]
-pub const fn between(from: i32, to: i32, weight: i32) -> i32 {
+#[expect(clippy::arithmetic_side_effects, reason = "weights sum to one with magnitudes of at most 1.6: the sum stays below 1.6 * 2^30")]
+pub const fn blend([a, b, c, d]: [i32; 4], [e, f, g, h]: [i32; 4]) -> i32 {
     const DROP: u32 = KEY_BITS + WEIGHT_BITS - PLAY_BITS;
-    ((from << WEIGHT_BITS) + (to - from) * weight + (1 << (DROP - 1))) >> DROP
+    (a * e + b * f + c * g + d * h + (1 << (DROP - 1))) >> DROP
 }
 
 /// The value `step` / 2^`log2` of the way from `from` to `to`, rounded down; exact at both ends.
@@ -72,19 +68,10 @@ mod tests {
     use super::*;
 
     #[test]
-    fn between_is_exact_at_both_ends() {
-        for (a, b) in [(0, 65_535), (65_535, 0), (17, 18), (40_000, 40_000)] {
-            assert_eq!(between(a, b, 0), a << 10);
-            assert_eq!(between(a, b, ONE), b << 10);
-        }
-    }
-
-    #[test]
-    fn between_keeps_constants_and_order() {
-        for weight in 0..=ONE {
-            assert_eq!(between(1234, 1234, weight), 1234 << 10);
-            assert!(between(5, 9, weight) <= between(5, 9, (weight + 1).min(ONE)));
-        }
+    fn blend_is_exact_at_the_keys_and_keeps_constants() {
+        assert_eq!(blend([1, 65_535, 3, 4], [0, ONE, 0, 0]), 65_535 << 10);
+        assert_eq!(blend([1, 2, 65_535, 4], [0, 0, ONE, 0]), 65_535 << 10);
+        assert_eq!(blend([1234; 4], [-700, ONE - 300, 1700, -700]), 1234 << 10);
     }
 
     #[test]

@@ -138,6 +138,14 @@ impl LabelRecord {
 pub const TIME_HOLD: u8 = 0;
 /// Straight lines between neighbouring keys.
 pub const TIME_LINEAR: u8 = 1;
+/// Catmull-Rom curves through four keys, straight at a layer's first and last.
+pub const TIME_CUBIC: u8 = 2;
+
+/// How many keys before an interval's first and after its first one are needed to play it.
+#[must_use]
+pub const fn reach(time: u8) -> (usize, usize) {
+    if time == TIME_CUBIC { (1, 2) } else { (0, 1) }
+}
 
 /// One camera path: the screen, the grid, the timeline and the coded keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -154,7 +162,7 @@ pub struct Path<'a> {
     pub looping: bool,
     /// A cell is 2^this pixels wide and high, 2..=5.
     pub cell_log2: u8,
-    /// [`TIME_HOLD`] or [`TIME_LINEAR`].
+    /// [`TIME_HOLD`], [`TIME_LINEAR`] or [`TIME_CUBIC`].
     pub time: u8,
     /// Coordinates are coded in steps of 2^this / 64 texel, 0..=4.
     pub step_log2: u8,

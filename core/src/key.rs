@@ -24,7 +24,7 @@ const SUPPORT_CLASSES: usize = 2;
 pub const CONTEXTS: usize = SUPPORT_CLASSES * NOISE_CLASSES * 2 * NUMBER_CONTEXTS;
 
 /// One key's layers in caller's memory, node by node, labels ascending.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Key<'m> {
     /// Where each node's layers start; one entry more than nodes.
     pub start: &'m mut [u16],

@@ -29,7 +29,6 @@
     clippy::arithmetic_side_effects,
     clippy::float_arithmetic
 )]
-#![cfg_attr(test, expect(clippy::indexing_slicing, clippy::unwrap_used, clippy::arithmetic_side_effects, reason = "tests may fail loudly"))]
 
 mod atlas;
 mod bundle;
@@ -47,10 +46,9 @@ mod memory;
 mod player;
 pub mod record;
 mod span;
-mod timeline;
+pub mod timeline;
 
 pub use bundle::{Bundle, checksum};
 pub use error::{BundleError, MemoryError};
 pub use graphics::FrameImage;
 pub use player::{ByteOrder, Frame, Player, Probe, Work};
-pub use timeline::Moment;

@@ -22,7 +22,7 @@ const PICK: usize = 3 * POOL;
 pub const CONTEXTS: usize = SAME + COUNT + PICK;
 
 /// The sheet lists of one key interval, in caller's memory: a byte of length and the labels, cell after cell.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Lists<'m> {
     /// Where each row of cells starts in `data`; one entry more than rows.
     rows: &'m mut [u16],

@@ -3,6 +3,7 @@
 
 use crate::Bundle;
 use crate::cell::{Layer, NodeRow, RowSheets, Sheet};
+use crate::format;
 use crate::key::{self, Key};
 use crate::lists::{self, Lists};
 use crate::record::Stream;
@@ -43,6 +44,9 @@ impl<'m> Cutter<'m> {
 fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
     let (grid, limits) = (bundle.grid(), bundle.limits());
     let (key_layers, row_layers) = (usize::from(limits.key_layers), usize::from(limits.row_layers));
+    let (back, ahead) = format::reach(bundle.path().time);
+    // Playing needs these; telling the next key needs the last two and itself.
+    let slots = back.saturating_add(ahead).saturating_add(1).max(3);
     let one_more = |count: usize| count.saturating_add(1);
     Workspace {
         palette: cutter.take(256),
@@ -50,11 +54,12 @@ fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
             list_contexts: cutter.take(lists::CONTEXTS),
             key_contexts: cutter.take(key::CONTEXTS),
             traces: cutter.take(row_layers.saturating_mul(2)),
-            keys: core::array::from_fn(|_| Key {
-                start: cutter.take(one_more(grid.nodes())),
-                label: cutter.take(key_layers),
-                uv: cutter.take(key_layers),
+            keys: core::array::from_fn(|slot| match slot < slots {
+                true => Key { start: cutter.take(one_more(grid.nodes())), label: cutter.take(key_layers), uv: cutter.take(key_layers) },
+                false => Key::default(),
             }),
+            slots,
+            turn: 0,
             lists: core::array::from_fn(|_| Lists::new(cutter.take(one_more(grid.rows)), cutter.take(usize::from(limits.list_bytes)))),
         },
         rows: core::array::from_fn(|_| NodeRow {

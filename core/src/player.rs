@@ -1,13 +1,13 @@
 //! The player: new, seek, row. Keys are decoded into the caller's memory by `seek`, pixels are made by `row`.
 
-use crate::cell::{NodeRow, RowSheets};
+use crate::cell::{Around, NodeRow, RowSheets};
 use crate::coder::Decoder;
 use crate::coverage::Chart;
 use crate::fixed::PlayUv;
-use crate::format::Limits;
+use crate::format::{self, Limits};
 use crate::key::Nothing;
 use crate::memory::{self, Workspace};
-use crate::record::{KEYS, Shape};
+use crate::record::Shape;
 use crate::span;
 use crate::timeline::Moment;
 use crate::{Bundle, MemoryError};
@@ -52,6 +52,26 @@ pub struct Probe {
     pub at: PlayUv,
 }
 
+/// The last key decoded, and how much of what led to it is known.
+#[derive(Clone, Copy, Debug)]
+struct Last {
+    key: usize,
+    /// Records since the last independent one.
+    run: u32,
+    /// Keys decoded one after the other up to this one.
+    chain: usize,
+}
+
+/// The keys that a moment needs.
+struct Needed {
+    first: usize,
+    last: usize,
+    /// Keys from the first to the last.
+    span: usize,
+    /// Keys from the start of the interval to the last.
+    ahead: usize,
+}
+
 /// Plays one bundle from memory that the caller owns.
 #[derive(Debug)]
 pub struct Player<'a> {
@@ -59,8 +79,8 @@ pub struct Player<'a> {
     space: Workspace<'a>,
     frame: Frame,
     moment: Moment,
-    /// The last key decoded: its place on the timeline, and how many before it no independent key separates from it.
-    last: Option<(usize, u32)>,
+    /// The last key decoded.
+    last: Option<Last>,
     /// The row of cells that `space.rows` and `space.sheets` hold.
     loaded: Option<usize>,
     work: Work,
@@ -78,7 +98,7 @@ impl<'a> Player<'a> {
             return Err(too_small);
         }
         let space = memory::workspace(bundle, memory).ok_or(too_small)?;
-        let moment = Moment { interval: 0, weight: 0 };
+        let moment = bundle.moment(0);
         let mut player = Self { bundle, space, frame: Frame(0), moment, last: None, loaded: None, work: Work::default() };
         player.set_byte_order(ByteOrder::Native);
         player.seek(Frame(0));
@@ -115,17 +135,53 @@ impl<'a> Player<'a> {
         self.loaded = None;
         self.frame = Frame(frame);
         self.moment = self.bundle.moment(frame);
-        let from = self.moment.interval;
-        // A path of one key has nothing to move on to.
-        let to = if self.bundle.key_count() == 1 && !self.bundle.looping() { from } else { from.saturating_add(1) };
-        let start = (0..=from).rev().find(|&key| self.bundle.key(key).independent).unwrap_or(0);
-        let next = match self.last {
-            Some((last, _)) if last == to => return,
-            Some((last, _)) if (start..to).contains(&last) => last.saturating_add(1),
-            _ => start,
+        let keys = self.bundle.key_count();
+        let Needed { first, last, span, .. } = self.needed();
+        // Either on from the last key, or from the independent key at or before the first one needed.
+        let on = self.last.map(|state| (state, self.distance(state.key, last))).filter(|(state, on)| {
+            let behind = self.bundle.looping() || state.key <= last;
+            behind && state.chain.saturating_add(*on) >= span
+        });
+        let back = (0..=first).rev().take_while(|&key| !self.bundle.key(key).independent).count();
+        let start = first.saturating_sub(back);
+        let anew = back.saturating_add(span);
+        let (mut key, count) = match on {
+            Some((state, on)) if on <= anew => (state.key.saturating_add(1), on),
+            _ => {
+                self.last = None;
+                (start, anew)
+            }
         };
-        for position in next..=to {
-            self.decode(position);
+        for _ in 0..count {
+            key = key.checked_rem(keys).unwrap_or(0);
+            self.decode(key);
+            key = key.saturating_add(1);
+        }
+    }
+
+    /// The keys that the current moment needs.
+    fn needed(&self) -> Needed {
+        let (back, ahead) = format::reach(self.bundle.path().time);
+        let (keys, from) = (self.bundle.key_count(), self.moment.interval);
+        let end = from.saturating_add(ahead);
+        if self.bundle.looping() {
+            let around = |key: usize| key.checked_rem(keys).unwrap_or(0);
+            let span = back.saturating_add(ahead).saturating_add(1);
+            // A loop of few keys comes by the same key more than once.
+            let first = around(from.saturating_add(keys.saturating_mul(back)).saturating_sub(back));
+            Needed { first, last: around(end), span, ahead }
+        } else {
+            let (first, last) = (from.saturating_sub(back), end.min(keys.saturating_sub(1)));
+            Needed { first, last, span: last.saturating_sub(first).saturating_add(1), ahead: last.saturating_sub(from) }
+        }
+    }
+
+    /// Keys from `from` on to `to`, around the loop where there is one.
+    fn distance(&self, from: usize, to: usize) -> usize {
+        let keys = self.bundle.key_count();
+        match to.checked_sub(from) {
+            Some(distance) => distance,
+            None => to.saturating_add(keys).saturating_sub(from),
         }
     }
 
@@ -185,15 +241,26 @@ impl<'a> Player<'a> {
     fn load(&mut self, row: usize) {
         let grid = self.bundle.grid();
         let texture = self.bundle.texture();
+        // How long ago the key at the start of the interval was decoded, and through it the others.
+        let age = self.needed().ahead;
+        let bundle = self.bundle;
+        let from = self.moment.interval as isize;
         let Workspace { stream, rows, sheets, .. } = &mut self.space;
-        let from = self.moment.interval;
-        let to = if self.bundle.key_count() == 1 && !self.bundle.looping() { from } else { from.wrapping_add(1) };
-        let (Some(a), Some(b), Some(lists)) = (stream.keys.get(from % KEYS), stream.keys.get(to % KEYS), stream.lists.get(from % KEYS))
-        else {
-            return;
+        let at = |offset: isize| {
+            let inside = bundle.looping() || (0..bundle.key_count() as isize).contains(&from.wrapping_add(offset));
+            stream.key(age.checked_add_signed(offset.wrapping_neg())?).filter(|_| inside)
+        };
+        let Some((start, lists)) = stream.key(age).zip(stream.lists(age)) else { return };
+        let cubic = format::reach(bundle.path().time).0 == 1;
+        let around = Around {
+            before: at(-1).filter(|_| cubic),
+            from: start,
+            // A path of one key has nothing to move on to.
+            to: at(1).unwrap_or(start),
+            after: at(2).filter(|_| cubic),
         };
         let mut fill = |nodes: &mut NodeRow<'_>, row: usize| {
-            let layers = nodes.fill(grid, row, [a, b], self.moment.weight, &texture);
+            let layers = nodes.fill(grid, row, &around, &self.moment.weights, &texture);
             self.work.layers = self.work.layers.wrapping_add(layers);
         };
         let [top, bottom] = rows;
@@ -208,19 +275,21 @@ impl<'a> Player<'a> {
         self.loaded = Some(row);
     }
 
-    /// Decodes the key at `position` of the timeline; position `key_count` of a looping path is key 0 again.
-    fn decode(&mut self, position: usize) {
+    /// Decodes `key`, which follows the last one decoded or is independent.
+    fn decode(&mut self, key: usize) {
         let bundle = self.bundle;
-        let index = position.checked_rem(bundle.key_count()).unwrap_or(0);
-        let place = bundle.place(position, self.last);
+        let run = match self.last {
+            Some(last) if !bundle.key(key).independent => last.run.saturating_add(1),
+            _ => 0,
+        };
         let shape = Shape {
             grid: bundle.grid(),
             labels: bundle.label_count(),
             label: |label| bundle.label(label),
             step_log2: u32::from(bundle.path().step_log2),
         };
-        self.space.stream.code(&mut Decoder::new(bundle.record(index)), shape, place, &mut Nothing);
-        self.last = Some((position, place.run));
+        self.space.stream.code(&mut Decoder::new(bundle.record(key)), shape, bundle.place(key, run), &mut Nothing);
+        self.last = Some(Last { key, run, chain: self.last.map_or(0, |last| last.chain).saturating_add(1) });
         self.work.keys = self.work.keys.wrapping_add(1);
     }
 }

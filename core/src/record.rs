@@ -7,8 +7,10 @@ use crate::grid::Grid;
 use crate::key::{self, Key, Setting, Source, Trace};
 use crate::lists::{self, Lists};
 
-/// Keys held at a time: two to play between, and the one that the next is also told from.
-pub const KEYS: usize = 3;
+/// Keys held at a time, at most: four to play a cubic interval. Two of them also tell the next.
+pub const MAX_KEYS: usize = 4;
+/// Sheet lists held at a time: those of the intervals from the one that plays to the one after the last key.
+pub const LISTS: usize = 3;
 
 /// Everything records are coded with and into.
 #[derive(Debug)]
@@ -19,10 +21,14 @@ pub struct Stream<'m> {
     pub key_contexts: &'m mut [Probability],
     /// Room for the layers of two rows of nodes.
     pub traces: &'m mut [Trace],
-    /// The last keys; the key at place p of the timeline is in slot p modulo [`KEYS`].
-    pub keys: [Key<'m>; KEYS],
-    /// The lists of the intervals that start at them.
-    pub lists: [Lists<'m>; KEYS],
+    /// The last keys, in a ring of the first `slots`.
+    pub keys: [Key<'m>; MAX_KEYS],
+    /// The lists of the intervals that start at them, in a ring too.
+    pub lists: [Lists<'m>; LISTS],
+    /// Keys in use: at least 3, at most [`MAX_KEYS`].
+    pub slots: usize,
+    /// Records coded so far.
+    pub turn: usize,
 }
 
 /// What does not change from record to record.
@@ -41,8 +47,6 @@ pub struct Shape<L> {
 /// A record's place on the timeline.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Place {
-    /// The key's place: its index; on a looping path, the number of keys stands for key 0 again.
-    pub position: usize,
     /// The record uses no earlier one.
     pub independent: bool,
     /// Records decoded since the last independent one.
@@ -55,8 +59,8 @@ pub struct Place {
     pub lengths: [u32; 2],
 }
 
-impl Stream<'_> {
-    /// Codes the record at `place`.
+impl<'m> Stream<'m> {
+    /// Codes the record at `place`, as the newest.
     pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord + Copy>(
         &mut self,
         bits: &mut B,
@@ -68,28 +72,66 @@ impl Stream<'_> {
             self.list_contexts.fill(Probability::NEW);
             self.key_contexts.fill(Probability::NEW);
         }
-        let [before_that, before, now] = by_age(&mut self.keys, place.position);
-        let [_, lists_before, lists_after] = by_age(&mut self.lists, place.position);
+        self.turn = self.turn.wrapping_add(1);
+        let (now_slot, list_slot, list_before_slot) = (self.key_slot(0), self.list_slot(0), self.list_slot(1));
+        let mut now = self.keys.get_mut(now_slot).map(core::mem::take).unwrap_or_default();
+        let mut lists_after = self.lists.get_mut(list_slot).map(core::mem::take).unwrap_or_default();
+        let mut lists_before = self.lists.get_mut(list_before_slot).map(core::mem::take).unwrap_or_default();
         let mut code = |known: Option<&Lists<'_>>, target: &mut Lists<'_>, ahead: bool| {
             lists::code(bits, self.list_contexts, shape.grid, shape.labels, known, target, &mut |cell| source.sheets(ahead, cell));
         };
         if place.has_after {
-            code((!place.independent).then_some(&*lists_before), lists_after, true);
+            code((!place.independent).then_some(&lists_before), &mut lists_after, true);
         }
         if place.independent && place.has_before {
             // Who starts here has not seen the interval before, which the key's layers depend on too.
-            code(place.has_after.then_some(&*lists_after), lists_before, false);
+            code(place.has_after.then_some(&lists_after), &mut lists_before, false);
         }
+        let key_contexts = core::mem::take(&mut self.key_contexts);
+        let traces = core::mem::take(&mut self.traces);
         let [length, length_before] = place.lengths;
         let setting = Setting {
             grid: shape.grid,
             label: shape.label,
             step_log2: shape.step_log2,
-            before: (place.run >= 1).then_some(&*before),
-            before_that: (place.run >= 2).then(|| (&*before_that, ratio(length, length_before))),
-            lists: [place.has_before.then_some(&*lists_before), place.has_after.then_some(&*lists_after)],
+            before: self.key(1).filter(|_| place.run >= 1),
+            before_that: self.key(2).filter(|_| place.run >= 2).map(|key| (key, ratio(length, length_before))),
+            lists: [place.has_before.then_some(&lists_before), place.has_after.then_some(&lists_after)],
         };
-        key::code(bits, self.key_contexts, &setting, now, self.traces, source);
+        key::code(bits, key_contexts, &setting, &mut now, traces, source);
+        (self.key_contexts, self.traces) = (key_contexts, traces);
+        self.put(now_slot, now, [(list_slot, lists_after), (list_before_slot, lists_before)]);
+    }
+
+    fn put(&mut self, slot: usize, key: Key<'m>, lists: [(usize, Lists<'m>); 2]) {
+        if let Some(place) = self.keys.get_mut(slot) {
+            *place = key;
+        }
+        for (slot, list) in lists {
+            if let Some(place) = self.lists.get_mut(slot) {
+                *place = list;
+            }
+        }
+    }
+
+    fn key_slot(&self, age: usize) -> usize {
+        self.turn.wrapping_sub(age).checked_rem(self.slots).unwrap_or(0)
+    }
+
+    fn list_slot(&self, age: usize) -> usize {
+        self.turn.wrapping_sub(age) % LISTS
+    }
+
+    /// The key coded `age` records before the last; `None` where it is not held any more.
+    #[must_use]
+    pub fn key(&self, age: usize) -> Option<&Key<'m>> {
+        self.keys.get(self.key_slot(age)).filter(|_| age < self.slots)
+    }
+
+    /// The lists of the interval that starts at that key.
+    #[must_use]
+    pub fn lists(&self, age: usize) -> Option<&Lists<'m>> {
+        self.lists.get(self.list_slot(age)).filter(|_| age < LISTS)
     }
 }
 
@@ -97,14 +139,4 @@ impl Stream<'_> {
 fn ratio(length: u32, before: u32) -> i32 {
     let ratio = length.wrapping_shl(8).checked_div(before).unwrap_or(256);
     i32::try_from(ratio.min(1 << 12)).unwrap_or(256)
-}
-
-/// The three slots in order of age, the one for `position` last.
-fn by_age<T>(slots: &mut [T; KEYS], position: usize) -> [&mut T; KEYS] {
-    let [a, b, c] = slots;
-    match position % KEYS {
-        0 => [b, c, a],
-        1 => [c, a, b],
-        _ => [a, b, c],
-    }
 }

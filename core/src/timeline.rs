@@ -1,18 +1,59 @@
-//! The timeline: from a frame to the two keys around it and the weight between them.
+//! The timeline: from a frame to the keys around it and their weights.
 //! Keys stand at frames that the bundle's table gives; on a looping path the first follows the last.
 
 use crate::Bundle;
-use crate::fixed::ONE;
-use crate::format::{KeyEntry, TIME_HOLD};
+use crate::fixed::{ONE, WEIGHT_BITS};
+use crate::format::{KeyEntry, TIME_CUBIC, TIME_HOLD};
 use crate::record::Place;
+
+/// The weights (Q14, summing to one) of four keys: the one before the interval, its two ends, the one after.
+pub type Weights = [i32; 4];
+
+/// The weights by which of the outer keys carry a layer: both; not the first; not the last; neither.
+pub type WeightSet = [Weights; 4];
 
 /// A moment between two keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Moment {
     /// The key interval; key `interval` is at or before the frame.
     pub interval: usize,
-    /// How far it is to key `interval + 1`, Q14.
-    pub weight: i32,
+    /// The weights of the keys around it.
+    pub weights: WeightSet,
+}
+
+/// The weights `passed` frames into an interval of `lengths[1]` frames, between intervals of `lengths[0]` and `lengths[2]`
+/// (0: there is none): a cubic Hermite curve whose tangents are the secants over two intervals (Catmull and Rom 1974, for unequal intervals), or
+/// over the one where a key is missing.
+#[must_use]
+pub fn weights(time: u8, lengths: [u32; 3], passed: u32) -> WeightSet {
+    let [before, length, after] = lengths.map(i64::from);
+    // Frames are below 2^24, weights below 2^15: every product below fits 64 bits.
+    let divided = |a: i64, b: i64| a.wrapping_mul(2).wrapping_add(b).checked_div_euclid(b.wrapping_mul(2)).unwrap_or(0);
+    let one = i64::from(ONE);
+    let t = if time == TIME_HOLD { 0 } else { divided(i64::from(passed).wrapping_mul(one), length).clamp(0, one) };
+    if time != TIME_CUBIC {
+        let t = t as i32;
+        return [[0, ONE.wrapping_sub(t), t, 0]; 4];
+    }
+    let down = |x: i64| x.wrapping_add(one / 2) >> WEIGHT_BITS;
+    let square = down(t.wrapping_mul(t));
+    let cube = down(square.wrapping_mul(t));
+    // The Hermite basis: the second value, the two tangents.
+    let value = square.wrapping_mul(3).wrapping_sub(cube.wrapping_mul(2));
+    let leaving = cube.wrapping_sub(square.wrapping_mul(2)).wrapping_add(t);
+    let arriving = cube.wrapping_sub(square);
+    let set = |missing: usize| {
+        let (first, last) = (missing & 1 == 0, missing & 2 == 0);
+        let leave = if first { divided(leaving.wrapping_mul(length), before.wrapping_add(length)) } else { leaving };
+        let arrive = if last { divided(arriving.wrapping_mul(length), length.wrapping_add(after)) } else { arriving };
+        let w0 = if first { leave.wrapping_neg() } else { 0 };
+        let w3 = if last { arrive } else { 0 };
+        // A missing key's tangent is the secant of the interval itself.
+        let w2 = value.wrapping_add(leave).wrapping_add(if last { 0 } else { arrive });
+        let w1 = one.wrapping_sub(w0).wrapping_sub(w2).wrapping_sub(w3);
+        [w0, w1, w2, w3].map(|w| w as i32)
+    };
+    [set(0), set(1), set(2), set(3)]
 }
 
 impl Bundle<'_> {
@@ -22,10 +63,21 @@ impl Bundle<'_> {
         if self.looping() { self.key_count() } else { self.key_count().saturating_sub(1).max(1) }
     }
 
-    /// The frame at which key `position` stands; positions past the last key stand at the end of the path.
+    /// The frame at which interval `interval` starts; that past the last key is the end of the path.
+    fn interval_start(&self, interval: usize) -> u32 {
+        if interval < self.key_count() { self.key(interval).frame } else { self.frames() }
+    }
+
+    /// Frames of interval `interval`, counted around the loop of a looping path; 0 where there is none.
     #[must_use]
-    pub fn key_frame(&self, position: usize) -> u32 {
-        if position < self.key_count() { self.key(position).frame } else { self.frames() }
+    pub fn interval_length(&self, interval: isize) -> u32 {
+        let count = self.intervals() as isize;
+        let index = if self.looping() { interval.checked_rem_euclid(count).unwrap_or(0) } else { interval };
+        if !(0..count).contains(&index) {
+            return 0;
+        }
+        let index = index as usize;
+        self.interval_start(index.saturating_add(1)).saturating_sub(self.interval_start(index))
     }
 
     /// The moment of `frame`, which is below [`Bundle::frames`].
@@ -34,35 +86,58 @@ impl Bundle<'_> {
         let (keys, _) = self.path().table.as_chunks();
         let after = keys.partition_point(|bytes| KeyEntry::from_bytes(bytes).frame <= frame);
         let interval = after.saturating_sub(1).min(self.intervals().saturating_sub(1));
-        let start = self.key_frame(interval);
-        let length = self.key_frame(interval.saturating_add(1)).saturating_sub(start);
-        let passed = frame.saturating_sub(start);
-        // Frames are below 2^24, intervals short: 64 bits hold the product, the quotient is at most ONE.
-        let weight = (u64::from(passed).wrapping_mul(ONE as u64).wrapping_add(u64::from(length / 2))).checked_div(u64::from(length));
-        let weight = if self.path().time == TIME_HOLD { 0 } else { weight.unwrap_or(0).min(ONE as u64) as i32 };
-        Moment { interval, weight }
+        let at = interval as isize;
+        let lengths = [self.interval_length(at.wrapping_sub(1)), self.interval_length(at), self.interval_length(at.wrapping_add(1))];
+        Moment { interval, weights: weights(self.path().time, lengths, frame.saturating_sub(self.interval_start(interval))) }
     }
 
-    /// The place of the record at `position` of the timeline, given the position and run of the last one coded.
+    /// The place of key `key`'s record, `run` records after the last independent one.
     #[must_use]
-    pub fn place(&self, position: usize, last: Option<(usize, u32)>) -> Place {
-        let index = position.checked_rem(self.key_count()).unwrap_or(0);
-        let independent = self.key(index).independent;
-        let run = match last {
-            Some((last, run)) if !independent && last.wrapping_add(1) == position => run.saturating_add(1),
-            _ => 0,
-        };
-        let length = |back: usize| {
-            let from = position.saturating_sub(back);
-            self.key_frame(from.saturating_add(1)).saturating_sub(self.key_frame(from))
-        };
+    pub fn place(&self, key: usize, run: u32) -> Place {
+        let at = key as isize;
         Place {
-            position,
-            independent,
+            independent: self.key(key).independent,
             run,
-            has_before: index > 0 || self.looping(),
-            has_after: index < self.intervals(),
-            lengths: [length(1), length(2)],
+            has_before: key > 0 || self.looping(),
+            has_after: key < self.intervals(),
+            lengths: [self.interval_length(at.wrapping_sub(1)), self.interval_length(at.wrapping_sub(2))],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::format::TIME_LINEAR;
+
+    #[test]
+    fn weights_sum_to_one_and_are_exact_at_both_keys() {
+        for time in [TIME_HOLD, TIME_LINEAR, TIME_CUBIC] {
+            for lengths in [[8, 8, 8], [8, 7, 3], [0, 5, 0], [1, 200, 9]] {
+                for passed in 0..=lengths[1] {
+                    for set in weights(time, lengths, passed) {
+                        assert_eq!(set.iter().sum::<i32>(), ONE);
+                    }
+                }
+                assert_eq!(weights(time, lengths, 0), [[0, ONE, 0, 0]; 4]);
+                if time != TIME_HOLD {
+                    assert_eq!(weights(time, lengths, lengths[1]), [[0, 0, ONE, 0]; 4]);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn cubic_weights_follow_straight_motion() {
+        // Positions on a line at the frames of unequal keys come back as that line.
+        let lengths = [8, 5, 3];
+        let positions = [-8, 0, 5, 8].map(|x| x * 1000);
+        for passed in 0..=5 {
+            for (missing, set) in weights(TIME_CUBIC, lengths, passed).iter().enumerate() {
+                let sum: i64 = set.iter().zip(positions).map(|(&w, x)| i64::from(w) * x).sum();
+                let exact = i64::from(passed) * 1000;
+                assert!(((sum >> 14) - exact).abs() <= 2, "{missing} {passed}: {} {exact}", sum >> 14);
+            }
         }
     }
 }

@@ -10,12 +10,11 @@ use crate::sheets::{KeyGrid, Layers, Sheets};
 use cubist_core::coder::Probability;
 use cubist_core::fixed::KEY_BITS;
 use cubist_core::format::{
-    ATLAS, Atlas, Envelope, FIXED, INFO, KeyEntry, LABELS, LabelRecord, Limits, MAGIC, MASK, MASKED, PATH, Path, Section, TIME_LINEAR,
-    VERSION,
+    ATLAS, Atlas, Envelope, FIXED, INFO, KeyEntry, LABELS, LabelRecord, Limits, MAGIC, MASK, MASKED, PATH, Path, Section, VERSION,
 };
 use cubist_core::key::{self, Key, Source, Trace};
 use cubist_core::lists::{self, Lists};
-use cubist_core::record::{KEYS, Place, Shape, Stream};
+use cubist_core::record::{LISTS, MAX_KEYS, Place, Shape, Stream};
 use range::Encoder;
 
 /// How keys are coded.
@@ -61,7 +60,7 @@ pub fn bundle(
         fps: frame.fps,
         looping: grid.looping,
         cell_log2: grid.grid.log2 as u8,
-        time: TIME_LINEAR,
+        time: grid.time,
         step_log2: settings.step_log2,
         limits: limits(grid, sheets, layers, settings),
         table: &table,
@@ -129,13 +128,14 @@ fn limits(grid: &KeyGrid, sheets: &Sheets, layers: &Layers, settings: CodingSett
     let count = |from: usize, to: usize| (layers.start[to] - layers.start[from]) as usize;
     let most = |values: &mut dyn Iterator<Item = usize>| u16::try_from(values.max().unwrap_or(0)).unwrap_or(u16::MAX);
     let width = grid.grid.node_columns();
+    let (back, ahead) = cubist_core::format::reach(grid.time);
     Limits {
         key_layers: most(&mut (0..grid.keys.len()).map(|key| count(key * nodes, (key + 1) * nodes))),
         row_layers: most(&mut (0..grid.keys.len() * grid.grid.node_rows()).map(|row| count(row * width, (row + 1) * width))),
         list_bytes: most(&mut sheets.lists.chunks(cells).map(|lists| lists.iter().map(|list| 1 + list.len()).sum())),
         row_sheets: most(&mut sheets.lists.chunks(grid.grid.columns).map(|lists| lists.iter().map(Vec::len).sum())),
         cell_sheets: sheets.lists.iter().map(Vec::len).max().unwrap_or(1) as u8,
-        seek_keys: (settings.independent_every.max(1).min(grid.keys.len()) + 1) as u16,
+        seek_keys: (settings.independent_every.clamp(1, grid.keys.len()) + back + ahead) as u16,
     }
 }
 
@@ -158,17 +158,15 @@ fn keys(
         label: |label: u8| labels.get(usize::from(label)).copied().unwrap_or_default(),
         step_log2: u32::from(settings.step_log2),
     };
-    let length = |interval: usize| grid.keys.get(interval).map_or(0, |&start| grid.end(interval) - start);
     let (mut table, mut records) = (Vec::new(), Vec::new());
     for (position, &frame) in grid.keys.iter().enumerate() {
         let run = position % settings.independent_every.max(1);
         let place = Place {
-            position,
             independent: run == 0,
             run: run as u32,
             has_before: position > 0 || grid.looping,
             has_after: position < grid.intervals(),
-            lengths: [length(position.saturating_sub(1)), length(position.saturating_sub(2))],
+            lengths: [grid.length(position as isize - 1), grid.length(position as isize - 2)],
         };
         let mut source = Wanted { gbuffer, grid, sheets, layers, fit, settings, key: position };
         let mut encoder = Encoder::default();
@@ -183,8 +181,8 @@ fn keys(
 struct Memory {
     contexts: [Vec<Probability>; 2],
     traces: Vec<Trace>,
-    keys: [(Vec<u16>, Vec<u8>, Vec<u32>); KEYS],
-    lists: [(Vec<u16>, Vec<u8>); KEYS],
+    keys: [(Vec<u16>, Vec<u8>, Vec<u32>); MAX_KEYS],
+    lists: [(Vec<u16>, Vec<u8>); LISTS],
 }
 
 impl Memory {
@@ -206,6 +204,8 @@ impl Memory {
             traces: &mut self.traces,
             keys: self.keys.each_mut().map(|(start, label, uv)| Key { start, label, uv }),
             lists: self.lists.each_mut().map(|(rows, data)| Lists::new(rows, data)),
+            slots: MAX_KEYS,
+            turn: 0,
         }
     }
 }

@@ -2,6 +2,19 @@
 //! Every loader ends here; everything after it starts here.
 
 pub mod builtin;
+mod error;
+mod file;
+mod gltf;
+mod heightfield;
+mod keys;
+mod load;
+mod model;
+mod obj;
+mod picture;
+mod ply;
+
+pub use error::SceneError;
+pub use load::{Overrides, load, load_builtin};
 
 use crate::camera::Path;
 use glam::{DVec3, Vec2, Vec3};
@@ -135,4 +148,19 @@ pub struct Scene {
     pub playback: Playback,
     /// What the loader wants the user to know.
     pub warnings: Vec<String>,
+}
+
+impl std::fmt::Debug for Scene {
+    /// Counts, not contents: a scene has millions of numbers.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Scene")
+            .field("name", &self.name)
+            .field("triangles", &self.triangles.len())
+            .field("materials", &self.materials.len())
+            .field("textures", &self.textures.len())
+            .field("lights", &self.lights)
+            .field("playback", &self.playback)
+            .field("warnings", &self.warnings)
+            .finish_non_exhaustive()
+    }
 }

@@ -1,6 +1,16 @@
 //! Camera paths: where the camera is at path parameter s, and the rays it casts.
 //! Paths come from scene files, models and built-in scenes; rays go to the G-buffer.
 
+mod animated;
+mod line;
+mod orbit;
+mod spline;
+
+pub use animated::{Animated, Channel, Interpolation, Link, Property};
+pub use line::{Aim, Line};
+pub use orbit::{Orbit, Pivot, bearing};
+pub use spline::{Spline, catmull_rom};
+
 use glam::DVec3;
 
 /// A pinhole camera at one moment. `right`, `up` and `forward` are orthonormal and right-handed

@@ -1,0 +1,331 @@
+//! Wavefront OBJ and its MTL files, through `tobj`, after a pass over the text that says in which line something is wrong.
+//! Files come from `load`; models go back there.
+
+use super::error::{SceneError, Warnings};
+use super::model::{MAX_TRIANGLES, Model, too_many};
+use super::picture::{self, read_file};
+use super::{Material, Texture, Triangle, Wrap};
+use glam::{DVec3, Vec2, Vec3};
+use std::cell::RefCell;
+use std::path::{Path, PathBuf};
+
+/// Loads an .obj file; `texture` serves a file whose materials name none.
+pub(crate) fn load(path: &Path, texture: Option<&Path>) -> Result<Model, SceneError> {
+    let bytes = read_file(path).map_err(|what| SceneError::Read { file: path.to_owned(), what })?;
+    // Names in other encodings are common; the numbers are ASCII whatever the encoding.
+    let text = String::from_utf8_lossy(&bytes);
+    model(&text, path.parent().unwrap_or(Path::new("")), texture).map_err(|what| SceneError::Model { file: path.to_owned(), what })
+}
+
+fn model(text: &str, folder: &Path, fallback: Option<&Path>) -> Result<Model, String> {
+    let mut model = Model::default();
+    let clean = check(text, &mut model.warnings)?;
+    let trouble = RefCell::new(Vec::new());
+    let options = tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, single_index: false };
+    let library = |name: &Path| {
+        let loaded = read_library(name, folder);
+        loaded.unwrap_or_else(|e| {
+            trouble.borrow_mut().push(e);
+            Ok(Default::default())
+        })
+    };
+    let (objects, materials) =
+        tobj::load_obj_buf(&mut clean.as_bytes(), &options, library).map_err(|e| format!("{e}: export the file again"))?;
+    for e in trouble.into_inner() {
+        model.warnings.add(e);
+    }
+    let mut textures = Shelf::default();
+    for m in materials.map_err(|e| format!("materials: {e}"))? {
+        let look = look(&m, folder, &mut textures, &mut model.warnings)?;
+        model.materials.push(look);
+    }
+    let plain = model.materials.len();
+    model.materials.push(Material::default());
+    if let Some(path) = fallback {
+        if textures.all.is_empty() {
+            let decoded = read_file(path).and_then(|b| picture::texture(&b, [Wrap::Repeat; 2]));
+            textures.all.push(decoded.map_err(|e| format!("texture {}: {e}", path.display()))?);
+            model.materials.iter_mut().for_each(|m| m.texture = Some(0));
+        } else {
+            model.warnings.add(format!("texture {} is not used: the model's materials name their own", path.display()));
+        }
+    }
+    model.textures = textures.all;
+    if !model.textures.is_empty() && objects.iter().all(|o| o.mesh.texcoords.len() <= 2) {
+        model.warnings.add("there are textures but no texture coordinates: they show their first texel only");
+    }
+    for object in &objects {
+        append(&object.mesh, plain, &mut model);
+    }
+    Ok(model)
+}
+
+/// Checks every line that matters and hands back a text that `tobj` takes as it is meant: lines joined, extras dropped.
+fn check(text: &str, warnings: &mut Warnings) -> Result<String, String> {
+    let mut clean = String::with_capacity(text.len());
+    // Number 1 of each stands for "none": left to itself, `tobj` gives such corners the ones of the corner before.
+    clean.push_str("vt 0 1\nvn 0 0 0\n");
+    let (mut vertices, mut coloured, mut uvs, mut normals, mut triangles) = (0i64, 0i64, 0i64, 0i64, 0usize);
+    let mut lines = text.lines().enumerate();
+    // Forward references are allowed: absolute indices are held against the whole file at the end.
+    let mut highest = [(0i64, 0usize); 3];
+    while let Some((number, line)) = lines.next() {
+        let place = number + 1;
+        let mut line = line.to_owned();
+        while line.ends_with('\\') {
+            line.pop();
+            line.push(' ');
+            line.push_str(lines.next().map_or("", |l| l.1));
+        }
+        let line = line.split('#').next().unwrap_or("").trim();
+        let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
+        let numbers = || rest.split_whitespace().map(|w| w.parse::<f32>().ok().filter(|v| v.is_finite())).collect::<Option<Vec<f32>>>();
+        match word {
+            "v" | "vt" | "vn" => {
+                let least = if word == "vt" { 1 } else { 3 };
+                let v = numbers()
+                    .filter(|v| v.len() >= least)
+                    .ok_or_else(|| format!("line {place}: \"{line}\"; expected at least {least} numbers"))?;
+                match word {
+                    "v" => {
+                        vertices += 1;
+                        coloured += i64::from(v.len() >= 6);
+                        clean.push_str(&format!("v {} {} {}", v[0], v[1], v[2]));
+                        if let [_, _, _, r, g, b, ..] = v[..] {
+                            clean.push_str(&format!(" {r} {g} {b}"));
+                        }
+                    }
+                    "vt" => {
+                        uvs += 1;
+                        clean.push_str(&format!("vt {} {}", v[0], v.get(1).copied().unwrap_or(0.0)));
+                    }
+                    _ => {
+                        normals += 1;
+                        clean.push_str(&format!("vn {} {} {}", v[0], v[1], v[2]));
+                    }
+                }
+            }
+            "f" => {
+                let mut corners = 0;
+                clean.push('f');
+                for corner in rest.split_whitespace() {
+                    corners += 1;
+                    let mut parsed = [0i64; 3];
+                    for (i, part) in corner.split('/').enumerate() {
+                        let odd = || format!("line {place}: \"{corner}\"; expected v, v/vt, v//vn or v/vt/vn");
+                        let (what, count) =
+                            [("vertices", vertices), ("texture coordinates", uvs), ("normals", normals)].get(i).copied().ok_or_else(odd)?;
+                        if part.is_empty() && i > 0 {
+                            continue;
+                        }
+                        let index: i64 = part.parse().map_err(|_| odd())?;
+                        if index == 0 || index < -count {
+                            return Err(format!("line {place}: index {index} of {count} {what} so far"));
+                        }
+                        parsed[i] = if index < 0 { count + 1 + index } else { index };
+                        if parsed[i] > highest[i].0 {
+                            highest[i] = (parsed[i], place);
+                        }
+                    }
+                    clean.push_str(&format!(" {}/{}/{}", parsed[0], parsed[1].saturating_add(1), parsed[2].saturating_add(1)));
+                }
+                if corners < 3 {
+                    return Err(format!("line {place}: a face of {corners} corners; expected at least 3"));
+                }
+                triangles += corners - 2;
+            }
+            "l" | "p" => {
+                warnings.add("points and lines are not shown: only faces are");
+                continue;
+            }
+            "mtllib" | "usemtl" | "o" | "g" if !rest.trim().is_empty() => clean.push_str(&format!("{word} {}", rest.trim())),
+            "o" | "g" => clean.push_str(word),
+            "curv" | "curv2" | "surf" => {
+                warnings.add("free-form curves and surfaces are not shown: export polygons");
+                continue;
+            }
+            _ => continue,
+        }
+        clean.push('\n');
+    }
+    for ((highest, line), (count, what)) in highest.iter().zip([(vertices, "vertices"), (uvs, "texture coordinates"), (normals, "normals")])
+    {
+        if *highest > count {
+            return Err(format!("line {line}: index {highest} of {count} {what}"));
+        }
+    }
+    if triangles > MAX_TRIANGLES {
+        return Err(too_many(triangles));
+    }
+    if coloured > 0 && coloured < vertices {
+        warnings.add(format!("only {coloured} of {vertices} vertices have colours: they are ignored"));
+        clean = clean
+            .lines()
+            .map(|l| match l.strip_prefix("v ") {
+                Some(rest) => format!("v {}\n", rest.split(' ').take(3).collect::<Vec<_>>().join(" ")),
+                None => format!("{l}\n"),
+            })
+            .collect();
+    }
+    Ok(clean)
+}
+
+/// Reads a material library, of it only the lines that are shown: anything else in it may be as odd as it likes.
+fn read_library(name: &Path, folder: &Path) -> Result<tobj::MTLLoadResult, String> {
+    let path = find(&name.to_string_lossy(), folder);
+    let bytes = read_file(&path).map_err(|e| format!("material library {}: {e}: its materials are left white", path.display()))?;
+    let text = String::from_utf8_lossy(&bytes);
+    let known = ["newmtl", "Kd", "Ke", "d", "Tr", "map_Kd", "map_d"];
+    let lines: Vec<&str> =
+        text.lines().map(str::trim).filter(|l| l.split_whitespace().next().is_some_and(|w| known.contains(&w))).collect();
+    let loaded = tobj::load_mtl_buf(&mut lines.join("\n").as_bytes());
+    if let Err(e) = loaded {
+        return Err(format!("material library {}: {e}: its materials are left white", path.display()));
+    }
+    Ok(loaded)
+}
+
+/// A file named in another, with either kind of slash.
+fn find(name: &str, folder: &Path) -> PathBuf {
+    let path = folder.join(name);
+    if path.exists() { path } else { folder.join(name.replace('\\', "/")) }
+}
+
+/// The file name at the end of a map statement, after its options.
+fn map_name(statement: &str) -> &str {
+    let mut rest = statement.trim();
+    while let Some(option) = rest.strip_prefix('-') {
+        let (name, mut tail) = option.split_once(char::is_whitespace).unwrap_or((option, ""));
+        // Numbers belong to the option; others take one word.
+        let mut words = usize::from(!matches!(name, "s" | "o" | "t" | "mm" | "bm" | "boost" | "texres"));
+        loop {
+            let (word, after) = tail.trim_start().split_once(char::is_whitespace).unwrap_or((tail.trim_start(), ""));
+            if after.is_empty() || (words == 0 && word.parse::<f32>().is_err()) {
+                break;
+            }
+            words = words.saturating_sub(1);
+            tail = after;
+            if words == 0 && !matches!(name, "s" | "o" | "t" | "mm" | "bm" | "boost" | "texres") {
+                break;
+            }
+        }
+        rest = tail.trim();
+    }
+    rest
+}
+
+/// The textures decoded so far, by what names them.
+#[derive(Default)]
+struct Shelf {
+    all: Vec<Texture>,
+    names: Vec<(PathBuf, Option<PathBuf>)>,
+}
+
+impl Shelf {
+    fn get(&mut self, colour: PathBuf, mask: Option<PathBuf>) -> Result<u32, String> {
+        let key = (colour, mask);
+        if let Some(i) = self.names.iter().position(|n| *n == key) {
+            return Ok(i as u32);
+        }
+        let read = |path: &Path| {
+            let decoded = read_file(path).and_then(|b| picture::texture(&b, [Wrap::Repeat; 2]));
+            decoded.map_err(|e| format!("texture {}: {e}", path.display()))
+        };
+        let mut texture = read(&key.0)?;
+        match &key.1 {
+            // One picture for both: the mask is its alpha, if it has any.
+            Some(mask) if *mask == key.0 => {}
+            Some(mask) => {
+                let mask = read(mask)?;
+                for y in 0..texture.height {
+                    for x in 0..texture.width {
+                        let (i, j) = (
+                            x as u64 * u64::from(mask.width) / u64::from(texture.width),
+                            y as u64 * u64::from(mask.height) / u64::from(texture.height),
+                        );
+                        let from = mask.texels[(j * u64::from(mask.width) + i) as usize];
+                        texture.texels[y as usize * texture.width as usize + x as usize][3] = from[0];
+                    }
+                }
+            }
+            None => {}
+        }
+        self.all.push(texture);
+        self.names.push(key);
+        Ok(self.all.len() as u32 - 1)
+    }
+}
+
+fn look(m: &tobj::Material, folder: &Path, textures: &mut Shelf, warnings: &mut Warnings) -> Result<Material, String> {
+    let mut out = Material { colour: m.diffuse.map_or(Vec3::ONE, Vec3::from), ..Material::default() };
+    let name = &m.name;
+    if let Some(statement) = &m.diffuse_texture {
+        let mask = m.dissolve_texture.as_ref().map(|s| find(map_name(s), folder));
+        let has_mask = mask.is_some();
+        out.texture = Some(textures.get(find(map_name(statement), folder), mask).map_err(|e| format!("material \"{name}\": {e}"))?);
+        if has_mask {
+            out.alpha_cutoff = Some(0.5);
+        }
+        if out.colour == Vec3::ZERO {
+            warnings.add(format!("material \"{name}\": its Kd is black under a texture: taken as white"));
+            out.colour = Vec3::ONE;
+        }
+    } else if m.dissolve_texture.is_some() {
+        warnings.add(format!("material \"{name}\": map_d without map_Kd is ignored"));
+    }
+    if let Some(glow) = m.emissive.map(Vec3::from).filter(|g| out.texture.is_none() && g.max_element() > 0.0 && g.cmpge(out.colour).all()) {
+        out.colour = glow;
+        out.unlit = true;
+    }
+    let transparency = m.unknown_param.get("Tr").and_then(|t| t.trim().parse::<f32>().ok());
+    let alpha = m.dissolve.or(transparency.map(|t| 1.0 - t)).unwrap_or(1.0).clamp(0.0, 1.0);
+    if alpha < 1.0 {
+        warnings.add(format!("material \"{name}\": its transparency is treated as a mask at 0.5"));
+        out.alpha = alpha;
+        out.alpha_cutoff = Some(0.5);
+    }
+    out.colour = out.colour.clamp(Vec3::ZERO, Vec3::ONE);
+    Ok(out)
+}
+
+fn append(mesh: &tobj::Mesh, plain: usize, model: &mut Model) {
+    let vec3 = |from: &[f32], i: u32| from.get(3 * i as usize..3 * i as usize + 3).map(Vec3::from_slice);
+    let uv = |i: u32| mesh.texcoords.get(2 * i as usize..2 * i as usize + 2).map(|t| Vec2::new(t[0], 1.0 - t[1]));
+    model.coloured |= !mesh.vertex_color.is_empty();
+    for (t, corners) in mesh.indices.as_chunks::<3>().0.iter().enumerate() {
+        let of = |indices: &[u32], k: usize| indices.get(3 * t + k).copied();
+        let normal = [0, 1, 2]
+            .map(|k| of(&mesh.normal_indices, k).and_then(|i| vec3(&mesh.normals, i)).and_then(Vec3::try_normalize).unwrap_or(Vec3::ZERO));
+        model.triangles.push(Triangle {
+            position: corners.map(|i| vec3(&mesh.positions, i).map_or(DVec3::ZERO, Vec3::as_dvec3)),
+            normal: if normal.contains(&Vec3::ZERO) { [Vec3::ZERO; 3] } else { normal },
+            uv: [0, 1, 2].map(|k| of(&mesh.texcoord_indices, k).and_then(uv).unwrap_or(Vec2::ZERO)),
+            colour: corners.map(|i| vec3(&mesh.vertex_color, i).map_or(Vec3::ONE, |c| c.clamp(Vec3::ZERO, Vec3::ONE))),
+            material: mesh.material_id.filter(|m| *m < plain).unwrap_or(plain) as u32,
+            island: None,
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn map_options_are_skipped() {
+        assert_eq!(map_name("wall brick.png"), "wall brick.png");
+        assert_eq!(map_name("-s 2 2 1 -clamp on wall brick.png"), "wall brick.png");
+        assert_eq!(map_name("-bm 0.5 a.png"), "a.png");
+    }
+
+    #[test]
+    fn faults_name_their_line() {
+        let check = |t: &str| check(t, &mut Warnings::default());
+        assert_eq!(check("v 0 0 0\nv 1 0 0\nf 1 2 9\n").unwrap_err(), "line 3: index 9 of 2 vertices");
+        assert!(check("v 0 0 0\nf 1 1 6148914691236517205\n").unwrap_err().starts_with("line 2: index"));
+        assert!(check("v 0 0 0\nf 1/x 1 1\n").unwrap_err().starts_with("line 2: \"1/x\""));
+        assert!(check("v 0 nan 0\n").unwrap_err().starts_with("line 1"));
+        assert!(check("v 0 0 0\nf -1 -2 -1\n").unwrap_err().contains("index -2 of 1 vertices so far"));
+        assert_eq!(check("v 0 0 0 1 # w\nv 1 0 \\\n0\nf 1 2 -1\n").unwrap(), "vt 0 1\nvn 0 0 0\nv 0 0 0\nv 1 0 0\nf 1/1/1 2/1/1 2/1/1\n");
+    }
+}

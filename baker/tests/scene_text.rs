@@ -1,0 +1,151 @@
+//! OBJ and PLY files, written here: what the loaders make of them.
+
+use cubist_baker::scene::{Overrides, Scene, load};
+use glam::{DVec3, Vec2, Vec3};
+use std::path::Path;
+
+fn with(files: &[(&str, &[u8])], open: &str) -> Result<Scene, String> {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, bytes) in files {
+        std::fs::write(folder.path().join(name), bytes).unwrap();
+    }
+    load(&folder.path().join(open), &Overrides::default()).map_err(|e| e.to_string())
+}
+
+fn save_png(colour: [u8; 3]) -> Vec<u8> {
+    let mut out = std::io::Cursor::new(Vec::new());
+    image::RgbImage::from_pixel(2, 2, image::Rgb(colour)).write_to(&mut out, image::ImageFormat::Png).unwrap();
+    out.into_inner()
+}
+
+const QUAD: &str = "v 0 0 0\nv 2 0 0\nv 2 1 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 2\n";
+
+#[test]
+fn obj_with_materials_textures_and_quads() {
+    let obj = format!("mtllib my mats.mtl\n{QUAD}usemtl red paint\nf 1/1/1 2/2/1 3/3/1 4/4/1\nusemtl wall\nf -4/-4 -3/-3 -2/-2\n");
+    let mtl = b"newmtl red paint\nKd 1 0.5 0\nNs odd\nnewmtl wall\nKd 0 0 0\nmap_Kd -s 1 1 1 wall.png\nillum x\n";
+    let scene = with(&[("a.obj", obj.as_bytes()), ("my mats.mtl", mtl), ("wall.png", &save_png([9, 8, 7]))], "a.obj").unwrap();
+    assert_eq!((scene.triangles.len(), scene.textures.len(), scene.lights.len()), (3, 1, 0));
+    let t = &scene.triangles[0];
+    assert_eq!(scene.materials[t.material as usize].colour, Vec3::new(1.0, 0.5, 0.0));
+    assert_eq!((t.normal[0], t.uv[0], t.uv[2]), (Vec3::Z, Vec2::new(0.0, 1.0), Vec2::new(1.0, 0.0)));
+    let wall = &scene.materials[scene.triangles[2].material as usize];
+    assert_eq!((wall.texture, wall.colour), (Some(0), Vec3::ONE));
+    assert_eq!(scene.triangles[2].normal, [Vec3::ZERO; 3]);
+    assert!(scene.warnings.iter().any(|w| w.contains("Kd is black")));
+}
+
+#[test]
+fn obj_without_its_library_is_white_and_says_so() {
+    let scene = with(&[("a.obj", format!("mtllib gone.mtl\n{QUAD}usemtl x\nf 1 2 3\nl 1 2\n").as_bytes())], "a.obj").unwrap();
+    assert!(scene.warnings.iter().any(|w| w.contains("gone.mtl")), "{:?}", scene.warnings);
+    assert!(scene.warnings.iter().any(|w| w.contains("lines are not shown")));
+    assert_eq!((scene.materials[0].colour, scene.lights.len()), (Vec3::ONE, 1));
+}
+
+#[test]
+fn obj_vertex_colours_and_the_texture_of_a_scene_file() {
+    let scene = with(&[("c.obj", b"v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nf 1 2 3\n")], "c.obj").unwrap();
+    assert_eq!(scene.triangles[0].colour, [Vec3::X, Vec3::Y, Vec3::Z]);
+    assert!(scene.lights.is_empty());
+    let toml = b"[scene]\nmodel = \"a.obj\"\ntexture = \"skin.png\"\n";
+    let files: [(&str, &[u8]); 3] =
+        [("s.toml", toml), ("a.obj", &[QUAD.as_bytes(), b"f 1/1 2/2 3/3"].concat()), ("skin.png", &save_png([1, 2, 3]))];
+    let scene = with(&files, "s.toml").unwrap();
+    assert_eq!(scene.textures[scene.materials[0].texture.unwrap() as usize].texels[0], [1, 2, 3, 255]);
+    let e = with(&files[..2], "s.toml").unwrap_err();
+    assert!(e.contains("line 3: scene.texture: no such file"), "{e}");
+}
+
+#[test]
+fn obj_faults_name_file_and_line() {
+    for (text, expected) in [
+        ("v 0 0 0\nf 1 2 3\n", "a.obj: line 2: index 3 of 1 vertices"),
+        ("v 0 0\n", "a.obj: line 1"),
+        ("v 0 0 0\nf 1\n", "a.obj: line 2: a face of 1 corners"),
+        ("# nothing\n", "no triangles"),
+        ("v 0 0 0\nv 1 1 1\nv 2 2 2\nf 1 2 3\n", "all 1 triangles are degenerate"),
+        ("v 0 0 0\nf 1/1/1/1 1 1\n", "a.obj: line 2"),
+    ] {
+        let e = with(&[("a.obj", text.as_bytes())], "a.obj").unwrap_err();
+        assert!(e.contains(expected), "expected \"{expected}\" in: {e}");
+    }
+    assert!(with(&[("a.obj", b"\xff\xfe\x00v")], "a.obj").is_err());
+}
+
+const HEAD: &str = "element vertex 4\nproperty float x\nproperty float y\nproperty double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
+
+fn binary(big: bool) -> Vec<u8> {
+    let mut out = format!("ply\nformat binary_{}_endian 1.0\n{HEAD}", if big { "big" } else { "little" }).into_bytes();
+    let corners = [[0f32, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]];
+    for (i, [x, y]) in corners.into_iter().enumerate() {
+        let z = i as f64 / 4.0;
+        if big {
+            out.extend(x.to_be_bytes());
+            out.extend(y.to_be_bytes());
+            out.extend(z.to_be_bytes());
+        } else {
+            out.extend(x.to_le_bytes());
+            out.extend(y.to_le_bytes());
+            out.extend(z.to_le_bytes());
+        }
+        out.extend([255, 51, 0]);
+    }
+    out.push(4);
+    for i in 0..4i32 {
+        out.extend(if big { i.to_be_bytes() } else { i.to_le_bytes() });
+    }
+    out
+}
+
+#[test]
+fn ply_ascii_and_binary_agree() {
+    let ascii = format!("ply\nformat ascii 1.0\n{HEAD}0 0 0 255 51 0\n2 0 0.25 255 51 0\n2 1 0.5 255 51 0\n0 1 0.75 255 51 0\n4 0 1 2 3\n");
+    for bytes in [ascii.into_bytes(), binary(false), binary(true)] {
+        let scene = with(&[("a.ply", &bytes)], "a.ply").unwrap();
+        assert_eq!(scene.triangles.len(), 2);
+        assert_eq!(scene.triangles[1].position, [DVec3::ZERO, DVec3::new(2.0, 1.0, 0.5), DVec3::new(0.0, 1.0, 0.75)]);
+        assert!((scene.triangles[0].colour[1] - Vec3::new(1.0, 0.2, 0.0)).length() < 1e-6);
+        assert!(scene.lights.is_empty());
+    }
+}
+
+#[test]
+fn ply_faults_are_errors() {
+    let ascii = |head: &str, body: &str| format!("ply\nformat ascii 1.0\n{head}end_header\n{body}").into_bytes();
+    let xyz = "property float x\nproperty float y\nproperty float z\n";
+    let face = "element face 1\nproperty list uchar int vertex_indices\n";
+    let many = format!("ply\nformat binary_little_endian 1.0\nelement vertex 4000000000\n{xyz}{face}end_header\n").into_bytes();
+    let empty = format!("ply\nformat binary_little_endian 1.0\nelement junk 4000000000\nelement vertex 0\n{xyz}end_header\n").into_bytes();
+    for (bytes, expected) in [
+        (ascii(&format!("element vertex 1\n{xyz}"), "0 0 0\n"), "no faces"),
+        (ascii(&format!("element vertex 1\n{xyz}{face}"), "0 0 0\n3 0 0 7\n"), "face 0: index 7 of 1 vertices"),
+        (ascii(&format!("element vertex 1\n{xyz}{face}"), "0 0 0\n3 0 0 -1\n"), "face 0: index -1 of 1 vertices"),
+        (ascii(&format!("element vertex 1\n{xyz}{face}"), "0 nan 0\n3 0 0 0\n"), "element vertex: Line 10"),
+        (ascii(&format!("element vertex 2\n{xyz}{face}"), "0 0 0\n"), "element vertex"),
+        (ascii("element vertex 1\nproperty float x\n", "0\n"), "no property y"),
+        (many, "need at least"),
+        (empty, "without properties"),
+        (b"plx\n".to_vec(), "header"),
+        (Vec::new(), "header"),
+    ] {
+        let e = with(&[("a.ply", &bytes)], "a.ply").unwrap_err();
+        assert!(e.contains("a.ply") && e.contains(expected), "expected \"{expected}\" in: {e}");
+    }
+    let whole = binary(false);
+    let mut damaged = whole.clone();
+    let at = damaged.windows(10).position(|w| w == b"end_header").unwrap() + 11;
+    damaged[at..at + 4].copy_from_slice(&f32::INFINITY.to_le_bytes());
+    assert!(with(&[("a.ply", &damaged)], "a.ply").unwrap_err().contains("vertex 0"));
+    for end in 0..whole.len() {
+        assert!(with(&[("a.ply", &whole[..end])], "a.ply").is_err(), "{end} bytes load");
+    }
+}
+
+#[test]
+fn an_unknown_ending_is_told_what_is_expected() {
+    let e = with(&[("a.stl", b"solid")], "a.stl").unwrap_err();
+    assert!(e.contains(".stl") && e.contains(".glb"), "{e}");
+    let e = load(Path::new("/no/such/file"), &Overrides::default()).err().unwrap().to_string();
+    assert!(e.contains("no such file"), "{e}");
+}
