@@ -7,7 +7,7 @@ use crate::gbuffer::Hits;
 use crate::scene::Scene;
 use crate::sheets::{self, KeyGrid, Layers};
 use crate::trace::Tracer;
-use crate::{fit, order};
+use crate::{fields, fit, order};
 use cubist_core::format::TIME_CUBIC;
 use std::time::Instant;
 use thiserror::Error;
@@ -56,6 +56,8 @@ pub struct Settings {
     pub coding: CodingSettings,
     /// A label seen in fewer pixels of a cell and interval is left out of it.
     pub least_pixels: u32,
+    /// Wrong pixels that a field has to save in a cell and interval to be used.
+    pub field_price: u32,
 }
 
 impl Default for Settings {
@@ -65,8 +67,9 @@ impl Default for Settings {
             key_interval: 8,
             time: TIME_CUBIC,
             atlas: atlas::Settings::default(),
-            coding: CodingSettings { step_log2: 1, lambda: 0.05, independent_every: 16 },
+            coding: CodingSettings { step_log2: 0, lambda: 0.05, independent_every: 16 },
             least_pixels: 4,
+            field_price: 4,
         }
     }
 }
@@ -130,11 +133,17 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let layers = Layers::of(&grid, &sheets);
     progress("fitting keys", 0.2);
     let fit = fit::solve(gbuffer, &grid, &sheets, &layers);
-    progress("ordering sheets", 0.7);
-    order::sort(gbuffer, &grid, image, &layers, &fit, &mut sheets);
+    progress("ordering sheets", 0.5);
+    let mut evidence =
+        order::Evidence { gbuffer, grid: &grid, image, layers: &layers, fit: &fit, fields: None, field_price: settings.field_price };
+    order::sort(&evidence, &mut sheets);
+    progress("fitting outlines", 0.6);
+    let fields = fields::solve(gbuffer, &grid, &sheets, &layers, image.labels.len());
+    evidence.fields = Some(&fields);
+    order::sort(&evidence, &mut sheets);
     progress("coding keys", 0.8);
     let header = encode::Frame { fps: scene.playback.fps, info: &scene.name };
-    let bundle = encode::bundle(gbuffer, &grid, image, &sheets, &layers, &fit, settings.coding, header);
+    let bundle = encode::bundle(gbuffer, &grid, image, &sheets, &layers, &fit, &fields, settings.coding, header);
     progress("coding keys", 1.0);
     Ok(Encoded { bundle, grid, dropped_pixels: sheets.dropped, seconds: start.elapsed().as_secs_f64() })
 }

@@ -35,9 +35,31 @@ impl Lens {
         Self { eye: pose.eye, forward: pose.forward, focal, right: pose.right, up: pose.up, half }
     }
 
+    /// The direction through the continuous screen position (`x`, `y`), not normalised: its depth is `focal`.
+    #[inline]
+    pub fn ray(&self, x: f64, y: f64) -> DVec3 {
+        self.forward * self.focal + self.right * (x - self.half[0]) + self.up * (self.half[1] - y)
+    }
+
     /// The unit direction through the continuous screen position (`x`, `y`).
     pub fn direction(&self, x: f64, y: f64) -> DVec3 {
-        (self.forward * self.focal + self.right * (x - self.half[0]) + self.up * (self.half[1] - y)).normalize()
+        self.ray(x, y).normalize()
+    }
+
+    /// The screen rectangle x0, y0, x1, y1 outside which no ray meets the box `lo`..`hi`.
+    fn reach(&self, [lo, hi]: [DVec3; 2]) -> [f64; 4] {
+        let mut rect = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
+        for i in 0..8 {
+            let pick = |bit: i32, lo: f64, hi: f64| if i & bit == 0 { lo } else { hi };
+            let d = DVec3::new(pick(1, lo.x, hi.x), pick(2, lo.y, hi.y), pick(4, lo.z, hi.z)) - self.eye;
+            let z = d.dot(self.forward);
+            if z < 1e-3 * d.length() {
+                return [f64::NEG_INFINITY, f64::NEG_INFINITY, f64::INFINITY, f64::INFINITY];
+            }
+            let (x, y) = (self.half[0] + self.focal * d.dot(self.right) / z, self.half[1] - self.focal * d.dot(self.up) / z);
+            rect = [rect[0].min(x - 1.0), rect[1].min(y - 1.0), rect[2].max(x + 1.0), rect[3].max(y + 1.0)];
+        }
+        rect
     }
 }
 
@@ -70,15 +92,18 @@ impl Hits {
         let (width, height, frames) = (scene.playback.width, scene.playback.height, scene.playback.frames);
         let row = width as usize;
         let total = u64::from(width) * u64::from(height) * u64::from(frames);
-        let lenses: Vec<Lens> = (0..frames).map(|f| Lens::new(scene, f)).collect();
+        let bounds = tracer.bounds();
+        let lenses: Vec<(Lens, [f64; 4])> = (0..frames).map(|f| Lens::new(scene, f)).map(|lens| (lens, lens.reach(bounds))).collect();
         let sided: Vec<bool> = scene.materials.iter().map(|m| !scene.lights.is_empty() && !m.unlit).collect();
         let mut samples = vec![Sample { surface: BACKGROUND, b: 0.0, c: 0.0 }; total as usize];
         let done = AtomicU64::new(0);
         samples.par_chunks_mut(row.max(1)).enumerate().for_each(|(line, out)| {
-            let lens = &lenses[line / height as usize];
+            let (lens, [x0, y0, x1, y1]) = &lenses[line / height as usize];
             let y = (line % height as usize) as f64 + 0.5;
-            for (x, sample) in out.iter_mut().enumerate() {
-                if let Some(hit) = tracer.hit(lens.eye, lens.direction(x as f64 + 0.5, y)) {
+            let columns =
+                if y < *y0 || y > *y1 { 0..0 } else { (x0.clamp(0.0, row as f64) as usize)..(x1.clamp(0.0, row as f64).ceil() as usize) };
+            for (x, sample) in out.iter_mut().enumerate().take(columns.end).skip(columns.start) {
+                if let Some(hit) = tracer.hit(lens.eye, lens.ray(x as f64 + 0.5, y)) {
                     let material = scene.triangles[hit.triangle as usize].material as usize;
                     let side = u32::from(hit.back && sided.get(material).copied().unwrap_or(false));
                     *sample = Sample { surface: hit.triangle * 2 + side, b: hit.bary[0] as f32, c: hit.bary[1] as f32 };

@@ -8,6 +8,7 @@ pub mod bake;
 pub mod camera;
 pub mod chart;
 pub mod encode;
+pub mod fields;
 pub mod fit;
 pub mod gbuffer;
 pub mod order;

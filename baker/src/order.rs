@@ -1,74 +1,126 @@
-//! Order: the sheets of every torn cell, front to back, such that the player's chart test shows the right sheet at
-//! as many pixels as can be. Positions come from `fit`; the ordered lists go to `encode`.
+//! Order: the sheets of every torn cell, front to back, and the coverage test of each, such that the player shows the
+//! right sheet at as many pixels as can be. Positions come from `fit`, fields from `fields`; the ordered lists go
+//! to `encode`.
 
 use crate::atlas::SourceImage;
+use crate::fields::Fields;
 use crate::fit::Fit;
 use crate::gbuffer::GBuffer;
 use crate::sheets::{Chain, KeyGrid, Layers, Sheets, bilinear};
+use cubist_core::format::{MAX_SHEETS, TIME_LINEAR};
+use cubist_core::lists::{BOTH, CHART, FIELD};
 use rayon::prelude::*;
 
 /// Up to this many sheets every order is tried; more are ordered greedily, front to back.
-const EXHAUSTIVE: usize = 6;
+const EXHAUSTIVE: usize = 5;
 
-/// Pixels of a torn cell that see the same: the sheet that shows, and those whose chart covers the pixel.
+/// What the sheets are ordered by.
+pub struct Evidence<'a> {
+    /// What is really seen.
+    pub gbuffer: &'a GBuffer,
+    /// The grid.
+    pub grid: &'a KeyGrid,
+    /// Where the charts lie.
+    pub image: &'a SourceImage,
+    /// The layers.
+    pub layers: &'a Layers,
+    /// Their positions.
+    pub fit: &'a Fit,
+    /// Their fields, once they are known.
+    pub fields: Option<&'a Fields>,
+    /// A field has to save this many pixels in a cell and interval to be worth its bytes.
+    pub field_price: u32,
+}
+
+/// Pixels of a torn cell that see the same.
 struct Group {
+    /// The sheet that should show.
     sheet: usize,
+    /// The sheets whose chart covers the pixel, one bit each, and from bit 16 on those whose fields do.
     covering: u32,
     pixels: u32,
 }
 
-/// Sorts the sheets of every cell front to back. Returns the pixels at which another sheet than the right one will show.
-pub fn sort(gbuffer: &GBuffer, grid: &KeyGrid, image: &SourceImage, layers: &Layers, fit: &Fit, sheets: &mut Sheets) -> u64 {
-    let cells = grid.grid.cells();
+impl Group {
+    fn covers(&self, sheet: usize, test: u16) -> bool {
+        let (chart, field) = (self.covering >> sheet & 1 == 1, self.covering >> (16 + sheet) & 1 == 1);
+        match test {
+            CHART => chart,
+            FIELD => field,
+            _ => chart && field,
+        }
+    }
+}
+
+/// An order with its tests, and the pixels it gets wrong.
+struct Choice {
+    order: Vec<usize>,
+    tests: u16,
+    wrong: u32,
+    /// Wrong pixels plus what the fields cost.
+    cost: u32,
+}
+
+/// Sorts the sheets of every cell front to back and chooses their tests. Returns the pixels at which
+/// another sheet than the right one will show.
+pub fn sort(evidence: &Evidence<'_>, sheets: &mut Sheets) -> u64 {
     let wrong: Vec<u64> = sheets
         .lists
         .par_iter_mut()
+        .zip(&mut sheets.tests)
         .enumerate()
-        .map(|(index, list)| {
+        .map(|(index, (list, tests))| {
             if list.len() < 2 {
                 return 0;
             }
-            let groups = observe(gbuffer, grid, image, layers, fit, index / cells, index % cells, list);
-            let order = if list.len() <= EXHAUSTIVE { best(&groups, list.len()) } else { greedy(&groups, list.len()) };
-            *list = order.iter().map(|&sheet| list[sheet]).collect();
-            u64::from(mistakes(&groups, &order))
+            let groups = observe(evidence, index, list);
+            let price = evidence.fields.map(|_| evidence.field_price);
+            let choice = if list.len() <= EXHAUSTIVE { best(&groups, list.len(), price) } else { greedy(&groups, list.len(), price) };
+            *list = choice.order.iter().map(|&sheet| list[sheet]).collect();
+            *tests = choice.tests;
+            u64::from(choice.wrong)
         })
         .collect();
     wrong.iter().sum()
 }
 
-#[expect(clippy::too_many_arguments, reason = "one place in the middle of the pipeline sees all of it")]
-fn observe(
-    gbuffer: &GBuffer,
-    grid: &KeyGrid,
-    image: &SourceImage,
-    layers: &Layers,
-    fit: &Fit,
-    interval: usize,
-    cell: usize,
-    list: &[u8],
-) -> Vec<Group> {
-    let chains: Vec<[Chain; 4]> = list.iter().map(|&label| layers.chains(grid, interval, cell, label, grid.time)).collect();
-    let mut groups: Vec<Group> = Vec::new();
+/// Counts the pixels of a cell and interval by what they see and what would cover them.
+fn observe(evidence: &Evidence<'_>, index: usize, list: &[u8]) -> Vec<Group> {
+    let &Evidence { gbuffer, grid, image, layers, fit, fields, .. } = evidence;
+    let cells = grid.grid.cells();
+    let (interval, cell) = (index / cells, index % cells);
+    let chains = |time| -> Vec<[Chain; 4]> { list.iter().map(|&label| layers.chains(grid, interval, cell, label, time)).collect() };
+    let (position_chains, field_chains) = (chains(grid.time), chains(TIME_LINEAR));
+    let mut seen: Vec<u64> = Vec::new();
     for frame in grid.frames_of(interval) {
         let weights = grid.weights(interval, frame, grid.time);
-        let corners: Vec<[[f32; 2]; 4]> = chains.iter().map(|chains| chains.map(|chain| chain.value(&fit.uv, &weights))).collect();
+        let linear = grid.weights(interval, frame, TIME_LINEAR);
+        let at_corners = |chains: &[[Chain; 4]], values: &[[f32; 2]], weights: &[[f32; 4]; 4]| -> Vec<[[f32; 2]; 4]> {
+            chains.iter().map(|chains| chains.map(|chain| chain.value(values, weights))).collect()
+        };
+        let positions = at_corners(&position_chains, &fit.uv, &weights);
+        let distances = fields.map(|fields| at_corners(&field_chains, &fields.uv, &linear));
         grid.each_pixel(frame, cell, |pixel, at| {
-            let label = gbuffer.label[pixel] as u8;
-            let Some(sheet) = list.iter().position(|&l| l == label) else { return };
+            let Some(sheet) = list.iter().position(|&label| u16::from(label) == gbuffer.label[pixel]) else { return };
             let corner = bilinear(at);
-            let mut covering = 0;
-            for (index, (&label, values)) in list.iter().zip(&corners).enumerate() {
-                let uv = [0, 1].map(|axis| values.iter().zip(corner).map(|(value, weight)| value[axis] * weight).sum());
-                covering |= u32::from(covers(image, label, uv)) << index;
+            let mix =
+                |values: &[[f32; 2]; 4]| [0, 1].map(|axis| values.iter().zip(corner).map(|(value, weight)| value[axis] * weight).sum());
+            let mut covering = 0u32;
+            for (place, &label) in list.iter().enumerate() {
+                covering |= u32::from(covers(image, label, mix(&positions[place]))) << place;
+                if let Some((fields, distances)) = fields.zip(distances.as_ref()) {
+                    let [a, b]: [f32; 2] = mix(&distances[place]);
+                    let inside = a > 0.0 && (!fields.strip[usize::from(label)] || b > 0.0);
+                    covering |= u32::from(inside) << (16 + place);
+                }
             }
-            match groups.iter_mut().find(|g| g.sheet == sheet && g.covering == covering) {
-                Some(group) => group.pixels += 1,
-                None => groups.push(Group { sheet, covering, pixels: 1 }),
-            }
+            seen.push((sheet as u64) << 32 | u64::from(covering));
         });
     }
-    groups
+    seen.sort_unstable();
+    seen.chunk_by(|a, b| a == b)
+        .map(|run| Group { sheet: (run[0] >> 32) as usize, covering: run[0] as u32, pixels: run.len() as u32 })
+        .collect()
 }
 
 /// The player's chart test.
@@ -81,21 +133,37 @@ fn covers(image: &SourceImage, label: u8, [u, v]: [f32; 2]) -> bool {
     !label.masked || image.covered[v as usize * image.width as usize + u as usize]
 }
 
-/// Pixels that show another sheet than theirs under `order`, front to back.
-fn mistakes(groups: &[Group], order: &[usize]) -> u32 {
+/// The tests and the cost of an order: each sheet's test is chosen in turn, front to back. `price` of a field; `None`: there are none.
+fn weigh(groups: &[Group], order: &[usize], price: Option<u32>) -> Choice {
+    let mut choice = Choice { order: order.to_vec(), tests: 0, wrong: 0, cost: 0 };
+    let mut left: Vec<&Group> = groups.iter().collect();
+    for (place, &sheet) in order[..order.len() - 1].iter().enumerate() {
+        let wrong = |test: u16| -> u32 { left.iter().filter(|g| g.covers(sheet, test) != (g.sheet == sheet)).map(|g| g.pixels).sum() };
+        let candidates = [(CHART, 0), (FIELD, price.unwrap_or(0)), (BOTH, price.unwrap_or(0))];
+        let tried = candidates.into_iter().take(if price.is_some() { 3 } else { 1 });
+        let (cost, wrong, test) =
+            tried.map(|(test, price)| (wrong(test) + price, wrong(test), test)).min_by_key(|&(cost, _, _)| cost).unwrap_or((0, 0, CHART));
+        choice.tests |= test << (2 * place);
+        choice.wrong += wrong;
+        choice.cost += cost;
+        // What it covers is settled, and so is what it should have.
+        left.retain(|g| !g.covers(sheet, test) && g.sheet != sheet);
+    }
     let back = order[order.len() - 1];
-    let shown = |covering: u32| order.iter().copied().find(|&sheet| covering >> sheet & 1 == 1).unwrap_or(back);
-    groups.iter().filter(|g| shown(g.covering) != g.sheet).map(|g| g.pixels).sum()
+    let wrong: u32 = left.iter().filter(|g| g.sheet != back).map(|g| g.pixels).sum();
+    choice.wrong += wrong;
+    choice.cost += wrong;
+    choice
 }
 
-/// The order with the fewest mistakes; of equal ones the first in lexical order.
-fn best(groups: &[Group], count: usize) -> Vec<usize> {
+/// The order with the least cost; of equal ones the first in lexical order.
+fn best(groups: &[Group], count: usize, price: Option<u32>) -> Choice {
     let mut order: Vec<usize> = (0..count).collect();
-    let (mut least, mut found) = (mistakes(groups, &order), order.clone());
+    let mut found = weigh(groups, &order, price);
     while next_permutation(&mut order) {
-        let wrong = mistakes(groups, &order);
-        if wrong < least {
-            (least, found) = (wrong, order.clone());
+        let choice = weigh(groups, &order, price);
+        if choice.cost < found.cost {
+            found = choice;
         }
     }
     found
@@ -110,22 +178,23 @@ fn next_permutation(order: &mut [usize]) -> bool {
     true
 }
 
-/// Front to back, always the sheet that hides the fewest pixels of the others still to come.
-fn greedy(groups: &[Group], count: usize) -> Vec<usize> {
-    let mut left: Vec<usize> = (0..count).collect();
+/// Front to back, always the sheet that gets the fewest of the pixels still to come wrong.
+fn greedy(groups: &[Group], count: usize, price: Option<u32>) -> Choice {
+    let mut rest: Vec<usize> = (0..count.min(MAX_SHEETS)).collect();
     let mut order = Vec::with_capacity(count);
-    let mut taken = 0u32;
-    while !left.is_empty() {
-        let hidden = |sheet: usize| -> u32 {
-            let hides = |g: &&Group| g.sheet != sheet && g.covering >> sheet & 1 == 1 && g.covering & taken == 0;
-            groups.iter().filter(hides).map(|g| g.pixels).sum()
+    let mut left: Vec<&Group> = groups.iter().collect();
+    let tests: &[u16] = if price.is_some() { &[CHART, FIELD, BOTH] } else { &[CHART] };
+    while !rest.is_empty() {
+        let wrong = |sheet: usize, test: u16| -> u32 {
+            left.iter().filter(|g| g.covers(sheet, test) != (g.sheet == sheet)).map(|g| g.pixels).sum()
         };
-        let at = (0..left.len()).min_by_key(|&at| hidden(left[at])).unwrap_or(0);
-        let sheet = left.remove(at);
-        taken |= 1 << sheet;
+        let candidates = rest.iter().enumerate().flat_map(|(at, &sheet)| tests.iter().map(move |&test| (at, sheet, test)));
+        let Some((at, sheet, test)) = candidates.min_by_key(|&(_, sheet, test)| wrong(sheet, test)) else { break };
+        rest.remove(at);
         order.push(sheet);
+        left.retain(|g| !g.covers(sheet, test) && g.sheet != sheet);
     }
-    order
+    weigh(groups, &order, price)
 }
 
 #[cfg(test)]
@@ -145,8 +214,18 @@ mod tests {
     #[test]
     fn the_sheet_that_covers_everything_goes_to_the_back() {
         let groups = [Group { sheet: 0, covering: 0b01, pixels: 10 }, Group { sheet: 1, covering: 0b11, pixels: 5 }];
-        assert_eq!(best(&groups, 2), [1, 0]);
-        assert_eq!(greedy(&groups, 2), [1, 0]);
-        assert_eq!(mistakes(&groups, &[1, 0]), 0);
+        for choice in [best(&groups, 2, None), greedy(&groups, 2, None)] {
+            assert_eq!((choice.order, choice.tests, choice.wrong), (vec![1, 0], CHART, 0));
+        }
+    }
+
+    #[test]
+    fn a_field_is_used_where_charts_cannot_tell() {
+        // Both charts cover everything; the field of the first tells.
+        let groups = [Group { sheet: 0, covering: 0x1_0003, pixels: 30 }, Group { sheet: 1, covering: 0b11, pixels: 20 }];
+        let choice = best(&groups, 2, Some(4));
+        assert_eq!((choice.order, choice.tests, choice.wrong, choice.cost), (vec![0, 1], FIELD, 0, 4));
+        // Not where it costs more than it saves.
+        assert_eq!(best(&groups, 2, Some(50)).tests, CHART);
     }
 }

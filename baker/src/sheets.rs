@@ -137,6 +137,8 @@ pub fn bilinear([x, y]: [f32; 2]) -> [f32; 4] {
 pub struct Sheets {
     /// Labels of the cell `interval * cells + cell`.
     pub lists: Vec<Vec<u8>>,
+    /// The coverage tests of all but the last, two bits each, the first one's lowest.
+    pub tests: Vec<u16>,
     /// Pixels whose sheet was left out.
     pub dropped: u64,
 }
@@ -166,7 +168,8 @@ pub fn find(gbuffer: &GBuffer, grid: &KeyGrid, least: u32) -> Sheets {
         })
         .collect();
     let dropped = found.iter().map(|(_, dropped)| dropped).sum();
-    Sheets { lists: found.into_iter().map(|(list, _)| list).collect(), dropped }
+    let tests = vec![0; found.len()];
+    Sheets { lists: found.into_iter().map(|(list, _)| list).collect(), tests, dropped }
 }
 
 /// The layers that nodes carry: for every key and node the labels of the cells around it, in the intervals that end

@@ -5,11 +5,13 @@ use crate::gbuffer::{Hits, Lens};
 use crate::scene::Scene;
 use crate::shade::is_hole;
 use glam::DVec3;
-use obvhs::BvhBuildParams;
 use obvhs::aabb::Aabb;
-use obvhs::cwbvh::CwBvh;
-use obvhs::cwbvh::builder::{build_cwbvh, build_cwbvh_from_tris};
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::leaf_collapser::collapse;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
+use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use obvhs::ray::{Ray, RayHit};
+use obvhs::{Boundable, BvhBuildParams};
 use rayon::prelude::*;
 use std::time::{Duration, Instant};
 
@@ -74,7 +76,7 @@ impl Leaf {
 /// A scene made ready for ray casting.
 pub struct Tracer<'a> {
     scene: &'a Scene,
-    hierarchy: Option<CwBvh>,
+    hierarchy: Option<Bvh2>,
     leaves: Vec<Leaf>,
     /// Single-precision boxes lose the least near the origin, so everything is moved there.
     centre: DVec3,
@@ -83,7 +85,7 @@ pub struct Tracer<'a> {
 /// A box as obvhs wants it.
 struct Padded(Aabb);
 
-impl obvhs::Boundable for Padded {
+impl Boundable for Padded {
     fn aabb(&self) -> Aabb {
         self.0
     }
@@ -98,9 +100,27 @@ fn extent(scene: &Scene) -> (DVec3, f64) {
     (centre, eyes.fold((hi - lo).length() * 0.5, f64::max))
 }
 
-/// Build settings: spatial splits would visit a triangle twice for little gain.
-fn parameters() -> BvhBuildParams {
-    BvhBuildParams::medium_build()
+/// Builds a hierarchy whatever the triangles are like. The wide hierarchy of obvhs has a fixed stack, which scenes of
+/// very unequal triangles overflow; the binary one can be told how deep it is.
+fn build<T: Boundable>(boxes: &[T]) -> Bvh2 {
+    let p = BvhBuildParams::medium_build();
+    let order = (0..boxes.len() as u32).collect();
+    let distance: PlocSearchDistance = p.ploc_search_distance;
+    let precision: SortPrecision = p.sort_precision;
+    let mut hierarchy = PlocBuilder::with_capacity(boxes.len()).build(distance, boxes, order, precision, p.search_depth_threshold);
+    ReinsertionOptimizer::default().run(&mut hierarchy, p.reinsertion_batch_ratio, None);
+    collapse(&mut hierarchy, p.max_prims_per_leaf, p.collapse_traversal_cost);
+    let again = p.reinsertion_batch_ratio * p.post_collapse_reinsertion_batch_ratio_multiplier;
+    ReinsertionOptimizer::default().run(&mut hierarchy, again, None);
+    let (mut deepest, mut stack) = (0, vec![(0, 1)]);
+    while let Some((i, depth)) = stack.pop() {
+        deepest = deepest.max(depth);
+        if let Some(node) = hierarchy.nodes.get(i).filter(|n| !n.is_leaf()) {
+            stack.extend([0, 1].map(|child| (node.first_index as usize + child, depth + 1)));
+        }
+    }
+    hierarchy.max_depth = deepest + 1;
+    hierarchy
 }
 
 impl<'a> Tracer<'a> {
@@ -121,7 +141,7 @@ impl<'a> Tracer<'a> {
                 Padded(Aabb::new((lo - pad).as_vec3a(), (hi + pad).as_vec3a()))
             })
             .collect();
-        let hierarchy = build_cwbvh(&boxes, parameters(), &mut Duration::default());
+        let hierarchy = build(&boxes);
         let leaves = hierarchy
             .primitive_indices
             .iter()
@@ -133,6 +153,14 @@ impl<'a> Tracer<'a> {
             })
             .collect();
         Self { scene, hierarchy: Some(hierarchy), leaves, centre }
+    }
+
+    /// The box around all triangles, world space: smallest and largest corner. Without triangles it is inside out.
+    pub fn bounds(&self) -> [DVec3; 2] {
+        let corners = |l: &Leaf| [l.corner, l.corner + l.edge[0], l.corner + l.edge[1]];
+        let (lo, hi) =
+            self.leaves.iter().flat_map(corners).fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)));
+        [lo + self.centre, hi + self.centre]
     }
 
     /// The closest hit in front of `origin`; of several at the same distance the one of the lowest triangle.
@@ -203,7 +231,7 @@ pub fn throughput(scene: &Scene) -> Throughput {
     if triangles.is_empty() || rays.is_empty() {
         return Throughput { rays: count, ours, obvhs_alone: alone };
     }
-    let hierarchy = build_cwbvh_from_tris(&triangles, parameters(), &mut Duration::default());
+    let hierarchy = build(&triangles);
     let ordered: Vec<_> = hierarchy.primitive_indices.iter().map(|&i| triangles[i as usize]).collect();
     let mut found = vec![RayHit::none(); rays.len()];
     for _ in 0..3 {

@@ -4,7 +4,7 @@ use cubist_baker::atlas::{Label, SourceImage};
 use cubist_baker::encode::{self, CodingSettings, Frame as Header};
 use cubist_baker::gbuffer::GBuffer;
 use cubist_baker::sheets::{self, KeyGrid, Layers};
-use cubist_baker::{fit, order};
+use cubist_baker::{fields, fit, order};
 use cubist_core::format::{TIME_CUBIC, TIME_LINEAR};
 use cubist_core::{Bundle, Frame, Player};
 
@@ -43,9 +43,13 @@ fn bake(gbuffer: &GBuffer, image: &SourceImage, looping: bool, independent_every
     let mut sheets = sheets::find(gbuffer, &grid, 1);
     let layers = Layers::of(&grid, &sheets);
     let fit = fit::solve(gbuffer, &grid, &sheets, &layers);
-    order::sort(gbuffer, &grid, image, &layers, &fit, &mut sheets);
+    let mut evidence = order::Evidence { gbuffer, grid: &grid, image, layers: &layers, fit: &fit, fields: None, field_price: 4 };
+    order::sort(&evidence, &mut sheets);
+    let fields = fields::solve(gbuffer, &grid, &sheets, &layers, image.labels.len());
+    evidence.fields = Some(&fields);
+    order::sort(&evidence, &mut sheets);
     let settings = CodingSettings { step_log2: 0, lambda: 0.0, independent_every };
-    encode::bundle(gbuffer, &grid, image, &sheets, &layers, &fit, settings, Header { fps: 30, info: "two sheets" })
+    encode::bundle(gbuffer, &grid, image, &sheets, &layers, &fit, &fields, settings, Header { fps: 30, info: "two sheets" })
 }
 
 fn play(bytes: &[u8], frames: impl Iterator<Item = u32>) -> Vec<Vec<u16>> {

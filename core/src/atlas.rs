@@ -36,12 +36,16 @@ impl Texture<'_> {
         self.mask.get(index >> 3).is_some_and(|byte| byte >> (index & 7) & 1 == 1)
     }
 
-    /// `uv` brought inside the picture, far enough from its edges (32 / 65536 texel) that the rounding of a span of 32
-    /// pixels between two such positions stays inside too.
+    /// Whether `uv` lies inside the picture.
+    #[must_use]
+    pub const fn holds(&self, uv: PlayUv) -> bool {
+        ((uv.u >> PLAY_BITS) as u32) < 1 << self.width_log2 && ((uv.v >> PLAY_BITS) as u32) < self.height
+    }
+
+    /// The position inside the picture that is closest to `uv`.
     #[must_use]
     pub fn clamp(&self, uv: PlayUv) -> PlayUv {
-        const EDGE: i32 = 32;
-        let limit = |size: u32| (size.wrapping_shl(PLAY_BITS) as i32).wrapping_sub(EDGE).max(EDGE);
-        PlayUv { u: uv.u.clamp(EDGE, limit(1 << self.width_log2)), v: uv.v.clamp(EDGE, limit(self.height)) }
+        let limit = |size: u32| (size.wrapping_shl(PLAY_BITS) as i32).wrapping_sub(1).max(0);
+        PlayUv { u: uv.u.clamp(0, limit(1 << self.width_log2)), v: uv.v.clamp(0, limit(self.height)) }
     }
 }

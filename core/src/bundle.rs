@@ -217,6 +217,7 @@ fn check_path<'a>(path: &Path<'a>) -> Result<&'a [[u8; KEY_BYTES]], BundleError>
     field(path.time <= TIME_CUBIC, "PATH time", u32::from(path.time))?;
     field(path.step_log2 <= 4, "PATH step_log2", u32::from(path.step_log2))?;
     field((1..=MAX_SHEETS as u8).contains(&path.limits.cell_sheets), "PATH cell_sheets", u32::from(path.limits.cell_sheets))?;
+    field(path.limits.fields <= 2, "PATH fields", u32::from(path.limits.fields))?;
     let (keys, rest) = path.table.as_chunks::<KEY_BYTES>();
     if !rest.is_empty() || keys.is_empty() {
         return Err(BundleError::Section { tag: PATH });

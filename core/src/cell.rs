@@ -1,13 +1,12 @@
 //! A row of cells at one moment: every node's layers interpolated in time, every cell's sheets with
 //! their four corners. Keys and lists come from the caller's memory, spans go to `span`.
 
-use crate::atlas::Texture;
-use crate::fixed::{KeyUv, PlayUv, blend, part};
+use crate::fixed::{KeyUv, ONE, PlayUv, WEIGHT_BITS, blend, part};
 use crate::grid::Grid;
 use crate::key::Key;
 use crate::lists::Lists;
-use crate::span::Span;
-use crate::timeline::WeightSet;
+use crate::span::{Fields, Span};
+use crate::timeline::{Moment, WeightSet};
 
 /// A layer at one moment.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
@@ -47,6 +46,19 @@ impl Around<'_, '_> {
     }
 }
 
+impl Around<'_, '_> {
+    /// The fields of a layer, straight between the interval's keys, Q16 pixels.
+    fn field(&self, [from, to]: [usize; 2], linear: i32) -> [i32; 2] {
+        let ([a, b], [c, d]) = (self.from.field(from), self.to.field(to));
+        // Distances are at most 2^15 and weights 2^14: the sums fit.
+        let mix = |from: i32, to: i32| {
+            let sum = from.wrapping_mul(ONE.wrapping_sub(linear)).wrapping_add(to.wrapping_mul(linear));
+            sum >> (WEIGHT_BITS - 8)
+        };
+        [mix(a, c), mix(b, d)]
+    }
+}
+
 /// One row of nodes at one moment, in caller's memory.
 #[derive(Debug)]
 pub struct NodeRow<'m> {
@@ -56,11 +68,14 @@ pub struct NodeRow<'m> {
     pub label: &'m mut [u8],
     /// Positions.
     pub layer: &'m mut [Layer],
+    /// Fields, Q16 pixels; empty where the bundle has none.
+    pub field: &'m mut [[i32; 2]],
 }
 
 impl NodeRow<'_> {
     /// Fills the row with the layers that both ends of the interval carry, weighted. Returns how many there are.
-    pub fn fill(&mut self, grid: Grid, row: usize, keys: &Around<'_, '_>, weights: &WeightSet, texture: &Texture<'_>) -> u32 {
+    pub fn fill(&mut self, grid: Grid, row: usize, keys: &Around<'_, '_>, moment: &Moment) -> u32 {
+        let (weights, linear) = (&moment.weights, moment.linear);
         let first = row.wrapping_mul(grid.node_columns());
         let mut count = 0usize;
         for column in 0..grid.node_columns() {
@@ -73,9 +88,12 @@ impl NodeRow<'_> {
                 if let Some(other) = keys.to.find(node, label)
                     && let Some((slot, layer)) = self.label.get_mut(count).zip(self.layer.get_mut(count))
                 {
-                    let uv = texture.clamp(keys.blend(node, label, [index, other], weights));
+                    let uv = keys.blend(node, label, [index, other], weights);
                     *slot = label;
                     *layer = Layer { u: uv.u, v: uv.v };
+                    if let Some(field) = self.field.get_mut(count) {
+                        *field = keys.field([index, other], linear);
+                    }
                     count = count.wrapping_add(1);
                 }
                 index = index.wrapping_add(1);
@@ -94,6 +112,10 @@ impl NodeRow<'_> {
         Some(from.wrapping_add(place) as u16)
     }
 
+    fn field(&self, layer: u16) -> [i32; 2] {
+        self.field.get(usize::from(layer)).copied().unwrap_or([1, 1])
+    }
+
     fn uv(&self, layer: u16) -> PlayUv {
         self.layer.get(usize::from(layer)).map_or_else(PlayUv::default, |l| PlayUv { u: l.u, v: l.v })
     }
@@ -105,14 +127,32 @@ impl NodeRow<'_> {
 pub struct Sheet {
     top: [u16; 2],
     bottom: [u16; 2],
-    label: u16,
+    label: u8,
+    test: u8,
 }
 
 impl Sheet {
     /// The sheet's label.
     #[must_use]
     pub const fn label(&self) -> u8 {
-        self.label as u8
+        self.label
+    }
+
+    /// The sheet's coverage test: one of [`crate::lists`]'s.
+    #[must_use]
+    pub const fn test(&self) -> u16 {
+        self.test as u16
+    }
+
+    /// The sheet's fields along pixel row `step` of the cell.
+    #[must_use]
+    pub fn fields(&self, top: &NodeRow<'_>, bottom: &NodeRow<'_>, step: u32, log2: u32) -> Fields {
+        let edge = |above: u16, below: u16| {
+            let ([a, b], [c, d]) = (top.field(above), bottom.field(below));
+            [part(a, c, step, log2), part(b, d, step, log2)]
+        };
+        let ([a, b], [c, d]) = (self.top, self.bottom);
+        Fields::between(edge(a, c), edge(b, d), log2)
     }
 
     /// The sheet along pixel row `step` of the cell.
@@ -147,12 +187,13 @@ impl RowSheets<'_> {
                 *start = count as u16;
             }
             let right = column.wrapping_add(1);
-            for &label in lists.sheets(cursor) {
+            let listed = lists.sheets(cursor);
+            for (index, &label) in listed.labels.iter().enumerate() {
                 let corners = (top.find(column, label), top.find(right, label), bottom.find(column, label), bottom.find(right, label));
                 if let (Some(a), Some(b), Some(c), Some(d)) = corners
                     && let Some(sheet) = self.sheet.get_mut(count)
                 {
-                    *sheet = Sheet { top: [a, b], bottom: [c, d], label: u16::from(label) };
+                    *sheet = Sheet { top: [a, b], bottom: [c, d], label, test: listed.test(index) as u8 };
                     count = count.wrapping_add(1);
                 }
             }

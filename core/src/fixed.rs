@@ -1,8 +1,12 @@
 //! Fixed-point numbers: how coordinates are stored in keys, how they are interpolated.
 //! Values come from `key`, weights from `timeline`; results go to `cell` and `span`.
 
-/// Fraction bits of a stored coordinate: 1/64 texel.
-pub const KEY_BITS: u32 = 6;
+/// Fraction bits of a stored coordinate: 1/32 texel.
+pub const KEY_BITS: u32 = 5;
+/// The least stored coordinate, 1/32 texel: half a picture's width outside, because ghosts are extrapolated.
+pub const KEY_MIN: i32 = -512 << KEY_BITS;
+/// The largest stored coordinate, 1/32 texel.
+pub const KEY_MAX: i32 = KEY_MIN + 0xffff;
 /// Fraction bits of a time weight.
 pub const WEIGHT_BITS: u32 = 14;
 /// A time weight of one.
@@ -10,28 +14,28 @@ pub const ONE: i32 = 1 << WEIGHT_BITS;
 /// Fraction bits of a coordinate during playback.
 pub const PLAY_BITS: u32 = 16;
 
-/// A stored position in the source image: u and v in Q10.6 texels, v in the upper half.
+/// A stored position in the source image: u and v in 1/32 texel from [`KEY_MIN`] on, 16 bits each, v in the upper half.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct KeyUv(pub u32);
 
 impl KeyUv {
-    /// From u and v in 1/64 texel, clamped to the 16 bits there are.
+    /// From u and v in 1/32 texel, clamped to the range there is.
     #[must_use]
     pub fn new(u: i32, v: i32) -> Self {
-        let clamp = |x: i32| u32::from(u16::try_from(x.clamp(0, 0xffff)).unwrap_or(0));
-        Self(clamp(v) << 16 | clamp(u))
+        let stored = |x: i32| x.clamp(KEY_MIN, KEY_MAX).wrapping_sub(KEY_MIN) as u32;
+        Self(stored(v) << 16 | stored(u))
     }
 
-    /// u in 1/64 texel, 0..=65535.
+    /// u in 1/32 texel, [`KEY_MIN`]..=[`KEY_MAX`].
     #[must_use]
     pub const fn u(self) -> i32 {
-        (self.0 & 0xffff) as i32
+        ((self.0 & 0xffff) as i32).wrapping_add(KEY_MIN)
     }
 
-    /// v in 1/64 texel, 0..=65535.
+    /// v in 1/32 texel, [`KEY_MIN`]..=[`KEY_MAX`].
     #[must_use]
     pub const fn v(self) -> i32 {
-        (self.0 >> 16) as i32
+        ((self.0 >> 16) as i32).wrapping_add(KEY_MIN)
     }
 }
 
@@ -44,10 +48,13 @@ pub struct PlayUv {
     pub v: i32,
 }
 
-/// The sum of `values` (Q10.6) times `weights` (Q14, summing to [`ONE`]), in Q15.16, rounded to nearest, ties up;
+/// The sum of `values` (1/32 texel) times `weights` (Q14, summing to [`ONE`]), in Q15.16, rounded to nearest, ties up;
 /// exact where one weight is [`ONE`].
 #[must_use]
-#[expect(clippy::arithmetic_side_effects, reason = "weights sum to one with magnitudes of at most 1.6: the sum stays below 1.6 * 2^30")]
+#[expect(
+    clippy::arithmetic_side_effects,
+    reason = "weights sum to one with magnitudes of at most 1.6: the sum stays below 1.6 * 2^30 in size"
+)]
 pub const fn blend([a, b, c, d]: [i32; 4], [e, f, g, h]: [i32; 4]) -> i32 {
     const DROP: u32 = KEY_BITS + WEIGHT_BITS - PLAY_BITS;
     (a * e + b * f + c * g + d * h + (1 << (DROP - 1))) >> DROP
@@ -63,15 +70,54 @@ pub const fn part(from: i32, to: i32, step: u32, log2: u32) -> i32 {
     (from as i64 + (((to as i64 - from as i64) * step as i64) >> log2)) as i32
 }
 
+/// The largest field code: 128 pixels.
+pub const MAX_FIELD: i32 = 37;
+
+/// The distance that field code `code` stands for, Q8 pixels: four steps an octave from 1/4 pixel, with a sign; 0 is 0.
+#[must_use]
+pub fn field_distance(code: i8) -> i32 {
+    // 64 * 2^(i / 4).
+    const STEPS: [i32; 4] = [64, 76, 91, 108];
+    let size = u32::from(code.unsigned_abs()).min(MAX_FIELD as u32);
+    let Some(index) = size.checked_sub(1) else { return 0 };
+    let distance = STEPS.get(index as usize & 3).copied().unwrap_or(0).wrapping_shl(index >> 2);
+    if code < 0 { distance.wrapping_neg() } else { distance }
+}
+
+/// The field code closest to `distance`, Q8 pixels.
+#[must_use]
+pub fn field_code(distance: i32) -> i8 {
+    let size = distance.unsigned_abs().min(1 << 20) as i32;
+    let mut code = 0i8;
+    // The codes' distances grow: stop at the first whose midpoint to the next is not passed.
+    while i32::from(code) < MAX_FIELD {
+        let (low, high) = (field_distance(code), field_distance(code.wrapping_add(1)));
+        if size.wrapping_mul(2) < low.wrapping_add(high) {
+            break;
+        }
+        code = code.wrapping_add(1);
+    }
+    if distance < 0 { code.wrapping_neg() } else { code }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn blend_is_exact_at_the_keys_and_keeps_constants() {
-        assert_eq!(blend([1, 65_535, 3, 4], [0, ONE, 0, 0]), 65_535 << 10);
-        assert_eq!(blend([1, 2, 65_535, 4], [0, 0, ONE, 0]), 65_535 << 10);
-        assert_eq!(blend([1234; 4], [-700, ONE - 300, 1700, -700]), 1234 << 10);
+        assert_eq!(blend([1, KEY_MAX, 3, 4], [0, ONE, 0, 0]), KEY_MAX << 11);
+        assert_eq!(blend([1, 2, KEY_MIN, 4], [0, 0, ONE, 0]), KEY_MIN << 11);
+        assert_eq!(blend([1234; 4], [-700, ONE - 300, 1700, -700]), 1234 << 11);
+    }
+
+    #[test]
+    fn field_codes_come_back() {
+        for code in -37..=37i8 {
+            assert_eq!(field_code(field_distance(code)), code);
+        }
+        assert_eq!(field_distance(37), 128 << 8);
+        assert_eq!((field_code(1 << 30), field_code(-(1 << 30)), field_code(20)), (37, -37, 0));
     }
 
     #[test]
@@ -84,7 +130,9 @@ mod tests {
 
     #[test]
     fn key_coordinates_saturate() {
-        let uv = KeyUv::new(-5, 70_000);
-        assert_eq!((uv.u(), uv.v()), (0, 65_535));
+        let uv = KeyUv::new(-70_000, 70_000);
+        assert_eq!((uv.u(), uv.v()), (KEY_MIN, KEY_MAX));
+        let uv = KeyUv::new(-5, 32_000);
+        assert_eq!((uv.u(), uv.v()), (-5, 32_000));
     }
 }

@@ -10,8 +10,8 @@ pub const MAGIC: [u8; 6] = *b"CUBIST";
 pub const VERSION: u16 = 1;
 /// The most sections a bundle can hold.
 pub const MAX_SECTIONS: usize = 16;
-/// The most sheets a cell can hold.
-pub const MAX_SHEETS: usize = 12;
+/// The most sheets a cell can hold: the tests of all but the last fit into 16 bits.
+pub const MAX_SHEETS: usize = 9;
 /// The most layers a node can hold: every label of the cells around it.
 pub const MAX_NODE_LAYERS: usize = 48;
 
@@ -68,8 +68,10 @@ pub struct Atlas<'a> {
 pub const MASKED: u8 = 1;
 /// [`LabelRecord::flags`]: the layer is an affine function of the screen position, not coded in keys.
 pub const FIXED: u8 = 2;
+/// [`LabelRecord::flags`]: the label's outline is told by two fields, distances from opposite sides, not by one.
+pub const STRIP: u8 = 4;
 /// All flags this version knows.
-pub const KNOWN_FLAGS: u8 = MASKED | FIXED;
+pub const KNOWN_FLAGS: u8 = MASKED | FIXED | STRIP;
 /// Bytes of a label record.
 pub const LABEL_BYTES: usize = 20;
 
@@ -89,9 +91,9 @@ pub struct LabelRecord {
     pub flags: u8,
     /// Room for a tint; 0: none.
     pub tint: [u8; 3],
-    /// [`FIXED`] labels: u at the screen's left edge, 1/64 texel.
+    /// [`FIXED`] labels: u at the screen's left edge, 1/32 texel.
     pub origin_u: u16,
-    /// [`FIXED`] labels: v at the screen's top edge, 1/64 texel.
+    /// [`FIXED`] labels: v at the screen's top edge, 1/32 texel.
     pub origin_v: u16,
     /// [`FIXED`] labels: u a pixel to the right, 1/16384 texel.
     pub step_u: u16,
@@ -164,7 +166,7 @@ pub struct Path<'a> {
     pub cell_log2: u8,
     /// [`TIME_HOLD`], [`TIME_LINEAR`] or [`TIME_CUBIC`].
     pub time: u8,
-    /// Coordinates are coded in steps of 2^this / 64 texel, 0..=4.
+    /// Coordinates are coded in steps of 2^this / 32 texel, 0..=4.
     pub step_log2: u8,
     /// The bounds that memory and work follow from.
     pub limits: Limits,
@@ -187,6 +189,8 @@ pub struct Limits {
     pub row_sheets: u16,
     /// Sheets in a cell.
     pub cell_sheets: u8,
+    /// Fields that a layer carries: 0 where no cell tests any, 2 where a tested label is a [`STRIP`].
+    pub fields: u8,
     /// Keys decoded by one seek.
     pub seek_keys: u16,
 }

@@ -8,10 +8,10 @@
 //! predictors compete; the one that was best at those neighbours is used.
 
 use crate::coder::{self, Bits, NUMBER_CONTEXTS, Probability};
-use crate::fixed::{KEY_BITS, KeyUv};
-use crate::format::{FIXED, LabelRecord, MAX_NODE_LAYERS};
+use crate::fixed::{self, KEY_BITS, KeyUv};
+use crate::format::{FIXED, LabelRecord, MAX_NODE_LAYERS, STRIP};
 use crate::grid::Grid;
-use crate::lists::{Cursor, Lists, Sheets};
+use crate::lists::{CHART, Cursor, Lists, Sheets};
 use heapless::Vec;
 
 /// Competing predictors.
@@ -21,7 +21,11 @@ const NOISE_CLASSES: usize = 9;
 /// Classes of how many of the eight cells around a node show the layer's label.
 const SUPPORT_CLASSES: usize = 2;
 /// Contexts the positions are coded with.
-pub const CONTEXTS: usize = SUPPORT_CLASSES * NOISE_CLASSES * 2 * NUMBER_CONTEXTS;
+const POSITION_CONTEXTS: usize = SUPPORT_CLASSES * NOISE_CLASSES * 2 * NUMBER_CONTEXTS;
+/// Ways a field can be told: from time and neighbours, from time, from neighbours, from nothing.
+const FIELD_CLASSES: usize = 4;
+/// Contexts a key is coded with.
+pub const CONTEXTS: usize = POSITION_CONTEXTS + FIELD_CLASSES * NUMBER_CONTEXTS;
 
 /// One key's layers in caller's memory, node by node, labels ascending.
 #[derive(Debug, Default)]
@@ -32,6 +36,8 @@ pub struct Key<'m> {
     pub label: &'m mut [u8],
     /// The layers' positions, [`KeyUv`] each.
     pub uv: &'m mut [u32],
+    /// The layers' fields, as codes (see [`fixed::field_distance`]); empty where the bundle has none. Layers that no cell tests hold zeros.
+    pub fields: [&'m mut [i8]; 2],
 }
 
 impl Key<'_> {
@@ -56,6 +62,14 @@ impl Key<'_> {
         KeyUv(self.uv.get(index).copied().unwrap_or(0))
     }
 
+    /// The fields of layer `index`, Q8 pixels.
+    #[must_use]
+    pub fn field(&self, index: usize) -> [i32; 2] {
+        let [a, b] = &self.fields;
+        let distance = |codes: &[i8]| codes.get(index).map_or(0, |&code| fixed::field_distance(code));
+        [distance(a), distance(b)]
+    }
+
     fn position(&self, node: usize, label: u8) -> Option<[i32; 2]> {
         self.find(node, label).map(|index| self.uv(index)).map(|uv| [uv.u(), uv.v()])
     }
@@ -67,7 +81,7 @@ impl Key<'_> {
 pub struct Trace {
     /// How far off each predictor was, steps, saturating.
     error: [u8; PREDICTORS],
-    /// Position less temporal prediction, 1/64 texel, saturating.
+    /// Position less temporal prediction, 1/32 texel, saturating.
     correction: [i16; 2],
     /// The residual that was coded, steps, saturating.
     noise: u8,
@@ -83,8 +97,11 @@ pub trait Source {
     fn sheets(&mut self, ahead: bool, cell: usize) -> Sheets;
 
     /// The residual to code, in steps along u and v, for the layer of `label` at `node` whose `predicted` position is in
-    /// 1/64 texel. `contexts` tell what residuals cost.
+    /// 1/32 texel. `contexts` tell what residuals cost.
     fn residual(&mut self, node: usize, label: u8, predicted: [i32; 2], contexts: [&[Probability]; 2]) -> [i32; 2];
+
+    /// The code of field `which` for the layer of `label` at `node`.
+    fn field(&mut self, node: usize, label: u8, which: usize) -> i8;
 }
 
 /// The source of a decoder: the bits say it all.
@@ -93,11 +110,15 @@ pub struct Nothing;
 
 impl Source for Nothing {
     fn sheets(&mut self, _: bool, _: usize) -> Sheets {
-        Sheets::new()
+        Sheets::default()
     }
 
     fn residual(&mut self, _: usize, _: u8, _: [i32; 2], _: [&[Probability]; 2]) -> [i32; 2] {
         [0, 0]
+    }
+
+    fn field(&mut self, _: usize, _: u8, _: usize) -> i8 {
+        0
     }
 }
 
@@ -108,7 +129,7 @@ pub struct Setting<'s, 'm, L> {
     pub grid: Grid,
     /// The record of a label.
     pub label: L,
-    /// Coordinates are coded in steps of 2^this / 64 texel.
+    /// Coordinates are coded in steps of 2^this / 32 texel.
     pub step_log2: u32,
     /// The key before, unless this one is independent.
     pub before: Option<&'s Key<'m>>,
@@ -136,7 +157,7 @@ pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
             if let Some(start) = target.start.get_mut(node) {
                 *start = layer as u16;
             }
-            let mut labels: Vec<(u8, u8), MAX_NODE_LAYERS> = Vec::new();
+            let mut labels: Vec<Found, MAX_NODE_LAYERS> = Vec::new();
             around.labels(setting.lists, column < grid.columns, &mut labels);
             let end = layer.wrapping_add(labels.len());
             // A node that breaks the key's bound carries nothing.
@@ -144,20 +165,21 @@ pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
             if !fits {
                 labels.clear();
             }
-            for (index, &(label, _)) in (layer..).zip(&labels) {
+            for (index, found) in (layer..).zip(&labels) {
                 if let Some(slot) = target.label.get_mut(index) {
-                    *slot = label;
+                    *slot = found.label;
                 }
             }
             if let Some(start) = target.start.get_mut(node.wrapping_add(1)) {
                 *start = layer.wrapping_add(labels.len()) as u16;
             }
-            for &(label, support) in &labels {
-                let place = Place { node, row, column, label, layer };
-                let coded = code_layer(bits, contexts, setting, target, traces, &place, support, source);
+            for found in &labels {
+                let place = Place { node, row, column, label: found.label, layer };
+                let coded = code_layer(bits, contexts, setting, target, traces, &place, found.support, source);
                 if let Some(slot) = target.uv.get_mut(layer) {
                     *slot = coded.0;
                 }
+                code_fields(bits, contexts, setting, target, &place, found.tested, source);
                 layer = layer.wrapping_add(1);
             }
             node = node.wrapping_add(1);
@@ -172,6 +194,15 @@ struct Place {
     column: usize,
     label: u8,
     layer: usize,
+}
+
+/// A label in the cells around a node.
+struct Found {
+    label: u8,
+    /// How many of the cells show it.
+    support: u8,
+    /// Some cell tests its fields.
+    tested: bool,
 }
 
 /// The cells around a node as a row of nodes is walked: above and below, in the interval before and after.
@@ -190,8 +221,8 @@ impl Corner {
         Self { left: [None; 4], right }
     }
 
-    /// Collects the labels of the cells around the node, ascending, with how many of the cells show each; then moves on.
-    fn labels(&mut self, lists: [Option<&Lists<'_>>; 2], inside: bool, found: &mut Vec<(u8, u8), MAX_NODE_LAYERS>) {
+    /// Collects the labels of the cells around the node, ascending; then moves on.
+    fn labels(&mut self, lists: [Option<&Lists<'_>>; 2], inside: bool, found: &mut Vec<Found, MAX_NODE_LAYERS>) {
         let [before, after] = lists;
         let owners = [before, before, after, after];
         if !inside {
@@ -200,12 +231,17 @@ impl Corner {
         for (cursors, owner) in self.left.iter().zip(&self.right).zip(owners) {
             let Some(owner) = owner else { continue };
             for cursor in [cursors.0, cursors.1].into_iter().flatten() {
-                for &label in owner.sheets(*cursor) {
-                    let at = found.partition_point(|&(l, _)| l < label);
+                let sheets = owner.sheets(*cursor);
+                for (index, &label) in sheets.labels.iter().enumerate() {
+                    let tested = sheets.test(index) != CHART;
+                    let at = found.partition_point(|other| other.label < label);
                     match found.get_mut(at) {
-                        Some((l, support)) if *l == label => *support = support.saturating_add(1),
+                        Some(other) if other.label == label => {
+                            other.support = other.support.saturating_add(1);
+                            other.tested |= tested;
+                        }
                         // Labels past the bound of a node are left out; its cells do without them.
-                        _ => drop(found.insert(at, (label, 1))),
+                        _ => drop(found.insert(at, Found { label, support: 1, tested })),
                     }
                 }
             }
@@ -237,7 +273,7 @@ fn code_layer<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
     let (predicted, noise) = candidates.choose(&neighbours, &record);
     let round = |x: i32| {
         let half = (1i32 << setting.step_log2) >> 1;
-        (x.clamp(0, 0xffff).wrapping_add(half)) >> setting.step_log2 << setting.step_log2
+        (x.clamp(fixed::KEY_MIN, fixed::KEY_MAX).wrapping_add(half)) >> setting.step_log2 << setting.step_log2
     };
     let predicted = predicted.map(round);
     let class = usize::from(support < 5).wrapping_mul(NOISE_CLASSES).wrapping_add(noise);
@@ -256,6 +292,71 @@ fn code_layer<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
         *slot = trace;
     }
     uv
+}
+
+/// Codes the fields of a layer, or clears them where no cell `tested` them.
+fn code_fields<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
+    bits: &mut B,
+    contexts: &mut [Probability],
+    setting: &Setting<'_, '_, L>,
+    key: &mut Key<'_>,
+    place: &Place,
+    tested: bool,
+    source: &mut S,
+) {
+    let strip = (setting.label)(place.label).flags & STRIP != 0;
+    for which in 0..2usize {
+        let wanted = tested && (which == 0 || strip);
+        let code = if wanted { code_field(bits, contexts, setting, key, place, which, source) } else { 0 };
+        if let Some(slot) = key.fields.get_mut(which).and_then(|codes| codes.get_mut(place.layer)) {
+            *slot = code;
+        }
+    }
+}
+
+/// Codes one field of a layer, told from the key before and how the same field changed at the nodes west and north of it.
+fn code_field<B: Bits, S: Source, L>(
+    bits: &mut B,
+    contexts: &mut [Probability],
+    setting: &Setting<'_, '_, L>,
+    key: &Key<'_>,
+    place: &Place,
+    which: usize,
+    source: &mut S,
+) -> i8 {
+    let width = setting.grid.node_columns();
+    // A field of zero is one that nothing is known about: its layer was not tested.
+    let known = |key: &Key<'_>, node: Option<usize>| {
+        let distance = key.field(key.find(node?, place.label)?).get(which).copied()?;
+        (distance != 0).then_some(distance)
+    };
+    let west = (place.column > 0).then(|| place.node.wrapping_sub(1));
+    let north = (place.row > 0).then(|| place.node.wrapping_sub(width));
+    let north_west = west.and(north).map(|node| node.wrapping_sub(1));
+    let before = |node: Option<usize>| setting.before.and_then(|key| known(key, node));
+    let held = before(Some(place.node));
+    let change = |node: Option<usize>| known(key, node).zip(before(node)).map(|(now, then)| now.wrapping_sub(then));
+    let average = |a: Option<i32>, b: Option<i32>| match (a, b) {
+        (Some(a), Some(b)) => Some(a.wrapping_add(b) >> 1),
+        (one, other) => one.or(other),
+    };
+    let moved = average(change(west), change(north));
+    let beside = match (known(key, west), known(key, north), known(key, north_west)) {
+        (Some(w), Some(n), Some(nw)) => Some(w.wrapping_add(n).wrapping_sub(nw)),
+        (w, n, _) => average(w, n),
+    };
+    let (predicted, class) = match (held, moved, beside) {
+        (Some(held), Some(moved), _) => (held.wrapping_add(moved), 0usize),
+        (Some(held), None, _) => (held, 1),
+        (None, _, Some(beside)) => (beside, 2),
+        (None, _, None) => (0, 3),
+    };
+    let predicted = i32::from(fixed::field_code(predicted));
+    let wanted = i32::from(source.field(place.node, place.label, which));
+    let at = class.wrapping_mul(NUMBER_CONTEXTS).wrapping_add(POSITION_CONTEXTS);
+    let Some(contexts) = contexts.get_mut(at..) else { return 0 };
+    let code = predicted.wrapping_add(coder::number(bits, contexts, wanted.wrapping_sub(predicted)));
+    code.clamp(-fixed::MAX_FIELD, fixed::MAX_FIELD) as i8
 }
 
 /// The position of a screen-fixed layer at a node: an affine function of the screen position.

@@ -7,8 +7,38 @@ use crate::format::MAX_SHEETS;
 use crate::grid::Grid;
 use heapless::Vec;
 
-/// The sheets of one cell: labels, front to back. One label: a smooth cell.
-pub type Sheets = Vec<u8, MAX_SHEETS>;
+/// The sheets of one cell: labels, front to back, and the coverage test of each but the last. One label: a smooth cell.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Sheets {
+    /// Labels, front to back.
+    pub labels: Vec<u8, MAX_SHEETS>,
+    /// Two bits a sheet, the front one's lowest: one of [`CHART`], [`FIELD`], [`BOTH`].
+    pub tests: u16,
+}
+
+/// The sheet shows where its position lies inside its chart.
+pub const CHART: u16 = 0;
+/// The sheet shows where its fields are positive.
+pub const FIELD: u16 = 1;
+/// The sheet shows where both tests say so.
+pub const BOTH: u16 = 2;
+
+/// The sheets of one cell, borrowed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SheetsRef<'l> {
+    /// Labels, front to back.
+    pub labels: &'l [u8],
+    /// Two bits a sheet.
+    pub tests: u16,
+}
+
+impl SheetsRef<'_> {
+    /// The test of the sheet at `index`, front to back.
+    #[must_use]
+    pub const fn test(&self, index: usize) -> u16 {
+        self.tests.wrapping_shr((index as u32).wrapping_mul(2)) & 3
+    }
+}
 
 /// Labels tried by their place in the neighbourhood before one is coded as a number.
 const POOL: usize = 16;
@@ -18,10 +48,13 @@ const SAME: usize = 5 * 8 * 2;
 const COUNT: usize = MAX_SHEETS;
 /// Flags "this label of the pool": place in the list x place in the pool.
 const PICK: usize = 3 * POOL;
+/// A sheet's test: is it a chart test, is it both.
+const TEST: usize = 2;
 /// Contexts the lists are coded with.
-pub const CONTEXTS: usize = SAME + COUNT + PICK;
+pub const CONTEXTS: usize = SAME + COUNT + PICK + TEST;
 
-/// The sheet lists of one key interval, in caller's memory: a byte of length and the labels, cell after cell.
+/// The sheet lists of one key interval, in caller's memory: a byte of length, the labels and, where there is more
+/// than one, two bytes of tests, cell after cell.
 #[derive(Debug, Default)]
 pub struct Lists<'m> {
     /// Where each row of cells starts in `data`; one entry more than rows.
@@ -44,29 +77,35 @@ impl<'m> Lists<'m> {
 
     /// The sheets at `cursor`; empty where there is no cell.
     #[must_use]
-    pub fn sheets(&self, cursor: Cursor) -> &[u8] {
-        let Some((&count, labels)) = self.data.get(cursor.at..).and_then(<[u8]>::split_first) else { return &[] };
-        labels.get(..usize::from(count)).unwrap_or(&[])
+    pub fn sheets(&self, cursor: Cursor) -> SheetsRef<'_> {
+        let Some((&count, rest)) = self.data.get(cursor.at..).and_then(<[u8]>::split_first) else { return SheetsRef::default() };
+        let Some((labels, rest)) = rest.split_at_checked(usize::from(count)) else { return SheetsRef::default() };
+        let tests = rest.first_chunk().filter(|_| count > 1).map_or(0, |bytes| u16::from_le_bytes(*bytes));
+        SheetsRef { labels, tests }
     }
 
-    fn push(&mut self, end: usize, sheets: &[u8]) -> usize {
-        let next = end.saturating_add(1).saturating_add(sheets.len());
-        match self.data.get_mut(end..next).and_then(<[u8]>::split_first_mut) {
-            Some((count, labels)) => {
-                *count = sheets.len() as u8;
-                // Not copy_from_slice: its check of the lengths would be the crate's one path to a panic.
-                labels.iter_mut().zip(sheets).for_each(|(slot, &label)| *slot = label);
-                next
-            }
+    fn push(&mut self, end: usize, sheets: &Sheets) -> usize {
+        let labels = sheets.labels.as_slice();
+        let next = end.saturating_add(bytes(labels.len()));
+        let Some((count, rest)) = self.data.get_mut(end..next).and_then(<[u8]>::split_first_mut) else {
             // A list that breaks its own bound is cut off: the cells after it show nothing.
-            None => {
-                if let Some(rest) = self.data.get_mut(end..) {
-                    rest.fill(0);
-                }
-                end
+            if let Some(rest) = self.data.get_mut(end..) {
+                rest.fill(0);
             }
+            return end;
+        };
+        *count = labels.len() as u8;
+        for (slot, byte) in rest.iter_mut().zip(labels.iter().copied().chain(sheets.tests.to_le_bytes())) {
+            *slot = byte;
         }
+        next
     }
+}
+
+/// Bytes that a list of `count` labels takes.
+#[must_use]
+pub const fn bytes(count: usize) -> usize {
+    count.saturating_add(if count > 1 { 3 } else { 1 })
 }
 
 /// A place among the lists.
@@ -81,7 +120,7 @@ impl Cursor {
     /// The cell to the right.
     #[must_use]
     pub fn next(self, lists: &Lists<'_>) -> Self {
-        Self { at: self.at.saturating_add(1).saturating_add(lists.sheets(self).len()) }
+        Self { at: self.at.saturating_add(bytes(lists.sheets(self).labels.len())) }
     }
 }
 
@@ -113,15 +152,15 @@ pub fn code<B: Bits>(
             let sheets = {
                 let around = Around {
                     near: [
-                        before.map_or(&[], |l| l.sheets(here)),
+                        before.map_or_else(SheetsRef::default, |l| l.sheets(here)),
                         target.sheets(west),
                         target.sheets(north),
                         target.sheets(north_east),
                         target.sheets(north_west),
                     ],
                     far: [
-                        before.map_or(&[], |l| l.sheets(if last { Cursor::NOWHERE } else { here.next(l) })),
-                        before.map_or(&[], |l| l.sheets(below)),
+                        before.map_or_else(SheetsRef::default, |l| l.sheets(if last { Cursor::NOWHERE } else { here.next(l) })),
+                        before.map_or_else(SheetsRef::default, |l| l.sheets(below)),
                     ],
                 };
                 coder.list(&around, &wanted(cell))
@@ -149,9 +188,9 @@ impl Lists<'_> {
 /// The lists a cell's own is told from.
 struct Around<'l> {
     /// Tried whole: the same cell before, west, north, north-east, north-west.
-    near: [&'l [u8]; 5],
+    near: [SheetsRef<'l>; 5],
     /// Their labels are likely too: east and south before.
-    far: [&'l [u8]; 2],
+    far: [SheetsRef<'l>; 2],
 }
 
 struct Coder<'c, B> {
@@ -166,45 +205,56 @@ impl<B: Bits> Coder<'_, B> {
     }
 
     /// One cell's list: the first of the neighbours' lists that is the same, else spelt out.
-    fn list(&mut self, around: &Around<'_>, wanted: &[u8]) -> Sheets {
+    fn list(&mut self, around: &Around<'_>, wanted: &Sheets) -> Sheets {
         let [time, west, north, ..] = around.near;
         let agree = usize::from(time == west) | usize::from(west == north) << 1 | usize::from(time == north) << 2;
-        let torn = usize::from(around.near.iter().any(|list| list.len() > 1));
+        let torn = usize::from(around.near.iter().any(|list| list.labels.len() > 1));
+        let same = SheetsRef { labels: &wanted.labels, tests: wanted.tests };
         let mut place = 0usize;
         for (index, list) in around.near.iter().enumerate() {
             let seen = around.near.iter().take(index).any(|earlier| earlier == list);
-            if list.is_empty() || seen {
+            if list.labels.is_empty() || seen {
                 continue;
             }
             let context = agree.wrapping_mul(2).wrapping_add(torn).wrapping_mul(5).wrapping_add(place);
-            if self.flag(context, *list == wanted) {
-                return Sheets::from_slice(list).unwrap_or_default();
+            if self.flag(context, *list == same) {
+                return Sheets { labels: Vec::from_slice(list.labels).unwrap_or_default(), tests: list.tests };
             }
             place = place.wrapping_add(1);
         }
         self.spell(around, wanted)
     }
 
-    /// A list that no neighbour has: its length, then each label, by its place among the neighbours' labels where it has one.
-    fn spell(&mut self, around: &Around<'_>, wanted: &[u8]) -> Sheets {
+    /// A list that no neighbour has: its length, then each label, by its place among the neighbours' labels where it has
+    /// one, and each test.
+    fn spell(&mut self, around: &Around<'_>, wanted: &Sheets) -> Sheets {
         let mut pool: Vec<u8, POOL> = Vec::new();
-        for label in around.near.iter().chain(&around.far).flat_map(|list| list.iter()) {
+        for label in around.near.iter().chain(&around.far).flat_map(|list| list.labels.iter()) {
             if !pool.contains(label) && pool.push(*label).is_err() {
                 break;
             }
         }
         let mut count = 1usize;
-        while count < MAX_SHEETS && self.flag(SAME.wrapping_add(count), count < wanted.len()) {
+        while count < MAX_SHEETS && self.flag(SAME.wrapping_add(count), count < wanted.labels.len()) {
             count = count.wrapping_add(1);
         }
-        let mut sheets = Sheets::new();
+        let mut sheets = Sheets::default();
         for index in 0..count {
-            let want = wanted.get(index).copied().unwrap_or(0);
-            let label = self.label(&pool, &sheets, index, want);
+            let want = wanted.labels.get(index).copied().unwrap_or(0);
+            let label = self.label(&pool, &sheets.labels, index, want);
             // The capacity is MAX_SHEETS, which bounds count.
-            let _ = sheets.push(label);
+            let _ = sheets.labels.push(label);
+            if index.wrapping_add(1) < count {
+                let test = self.test(SheetsRef { labels: &[], tests: wanted.tests }.test(index));
+                sheets.tests |= test.wrapping_shl((index as u32).wrapping_mul(2));
+            }
         }
         sheets
+    }
+
+    fn test(&mut self, want: u16) -> u16 {
+        let first = SAME.wrapping_add(COUNT).wrapping_add(PICK);
+        if self.flag(first, want != CHART) { if self.flag(first.wrapping_add(1), want == BOTH) { BOTH } else { FIELD } } else { CHART }
     }
 
     fn label(&mut self, pool: &[u8], taken: &[u8], index: usize, want: u8) -> u8 {

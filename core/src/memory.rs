@@ -47,6 +47,7 @@ fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
     let (back, ahead) = format::reach(bundle.path().time);
     // Playing needs these; telling the next key needs the last two and itself.
     let slots = back.saturating_add(ahead).saturating_add(1).max(3);
+    let fields = usize::from(limits.fields);
     let one_more = |count: usize| count.saturating_add(1);
     Workspace {
         palette: cutter.take(256),
@@ -55,7 +56,12 @@ fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
             key_contexts: cutter.take(key::CONTEXTS),
             traces: cutter.take(row_layers.saturating_mul(2)),
             keys: core::array::from_fn(|slot| match slot < slots {
-                true => Key { start: cutter.take(one_more(grid.nodes())), label: cutter.take(key_layers), uv: cutter.take(key_layers) },
+                true => Key {
+                    start: cutter.take(one_more(grid.nodes())),
+                    label: cutter.take(key_layers),
+                    uv: cutter.take(key_layers),
+                    fields: core::array::from_fn(|which| cutter.take(if which < fields { key_layers } else { 0 })),
+                },
                 false => Key::default(),
             }),
             slots,
@@ -66,6 +72,7 @@ fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
             start: cutter.take(one_more(grid.node_columns())),
             label: cutter.take(row_layers),
             layer: cutter.take::<Layer>(row_layers),
+            field: cutter.take::<[i32; 2]>(if fields > 0 { row_layers } else { 0 }),
         }),
         sheets: RowSheets { start: cutter.take(one_more(grid.columns)), sheet: cutter.take::<Sheet>(usize::from(limits.row_sheets)) },
     }

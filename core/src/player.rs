@@ -4,11 +4,12 @@ use crate::cell::{Around, NodeRow, RowSheets};
 use crate::coder::Decoder;
 use crate::coverage::Chart;
 use crate::fixed::PlayUv;
-use crate::format::{self, Limits};
+use crate::format::{self, Limits, STRIP};
 use crate::key::Nothing;
+use crate::lists::{CHART, FIELD};
 use crate::memory::{self, Workspace};
 use crate::record::Shape;
-use crate::span;
+use crate::span::{self, Test};
 use crate::timeline::Moment;
 use crate::{Bundle, MemoryError};
 
@@ -114,6 +115,8 @@ impl<'a> Player<'a> {
     /// Pixels come in this byte order from now on.
     pub fn set_byte_order(&mut self, order: ByteOrder) {
         let (colours, _) = self.bundle.atlas().palette.as_chunks::<2>();
+        // A texel past the palette's end must not show what the caller's memory held.
+        self.space.palette.fill(0);
         for (entry, bytes) in self.space.palette.iter_mut().zip(colours) {
             let colour = u16::from_le_bytes(*bytes);
             *entry = match order {
@@ -240,7 +243,6 @@ impl<'a> Player<'a> {
     /// Interpolates the nodes around a row of cells and looks up its sheets.
     fn load(&mut self, row: usize) {
         let grid = self.bundle.grid();
-        let texture = self.bundle.texture();
         // How long ago the key at the start of the interval was decoded, and through it the others.
         let age = self.needed().ahead;
         let bundle = self.bundle;
@@ -260,7 +262,7 @@ impl<'a> Player<'a> {
             after: at(2).filter(|_| cubic),
         };
         let mut fill = |nodes: &mut NodeRow<'_>, row: usize| {
-            let layers = nodes.fill(grid, row, &around, &self.moment.weights, &texture);
+            let layers = nodes.fill(grid, row, &around, &self.moment);
             self.work.layers = self.work.layers.wrapping_add(layers);
         };
         let [top, bottom] = rows;
@@ -318,11 +320,17 @@ impl Drawing<'_, '_> {
                 continue;
             };
             let count = pixels.len() as u32;
-            span::all(pixels, back.span(top, bottom, step, log2), |uv| make(uv, back.label()));
+            span::all(pixels, back.span(top, bottom, step, log2), &texture, |uv| make(uv, back.label()));
             // Back to front: the frontmost sheet that covers a pixel has the last word.
             for sheet in front.iter().rev() {
-                let chart = Chart::new(&self.bundle.label(sheet.label()));
-                span::covered(pixels, sheet.span(top, bottom, step, log2), &chart, &texture, |uv| make(uv, sheet.label()));
+                let record = self.bundle.label(sheet.label());
+                let test = Test {
+                    chart: (sheet.test() != FIELD).then(|| Chart::new(&record)),
+                    fields: (sheet.test() != CHART).then(|| sheet.fields(top, bottom, step, log2)),
+                    strip: sheet.test() != CHART && record.flags & STRIP != 0,
+                    texture,
+                };
+                span::covered(pixels, sheet.span(top, bottom, step, log2), &test, |uv| make(uv, sheet.label()));
                 work.coverage_tests = work.coverage_tests.wrapping_add(count);
             }
             let kind = if front.is_empty() { &mut work.smooth_pixels } else { &mut work.torn_pixels };

@@ -40,7 +40,7 @@ pub struct Shape<L> {
     pub labels: usize,
     /// The record of a label.
     pub label: L,
-    /// Coordinates are coded in steps of 2^this / 64 texel.
+    /// Coordinates are coded in steps of 2^this / 32 texel.
     pub step_log2: u32,
 }
 

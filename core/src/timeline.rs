@@ -3,7 +3,7 @@
 
 use crate::Bundle;
 use crate::fixed::{ONE, WEIGHT_BITS};
-use crate::format::{KeyEntry, TIME_CUBIC, TIME_HOLD};
+use crate::format::{KeyEntry, TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
 use crate::record::Place;
 
 /// The weights (Q14, summing to one) of four keys: the one before the interval, its two ends, the one after.
@@ -19,6 +19,8 @@ pub struct Moment {
     pub interval: usize,
     /// The weights of the keys around it.
     pub weights: WeightSet,
+    /// How far it is to the end of the interval, Q14.
+    pub linear: i32,
 }
 
 /// The weights `passed` frames into an interval of `lengths[1]` frames, between intervals of `lengths[0]` and `lengths[2]`
@@ -26,32 +28,36 @@ pub struct Moment {
 /// over the one where a key is missing.
 #[must_use]
 pub fn weights(time: u8, lengths: [u32; 3], passed: u32) -> WeightSet {
+    // Q28 inside, rounded once at the end: at keys a power of two apart the weights are exact.
+    const INNER: u32 = 28;
     let [before, length, after] = lengths.map(i64::from);
-    // Frames are below 2^24, weights below 2^15: every product below fits 64 bits.
-    let divided = |a: i64, b: i64| a.wrapping_mul(2).wrapping_add(b).checked_div_euclid(b.wrapping_mul(2)).unwrap_or(0);
-    let one = i64::from(ONE);
-    let t = if time == TIME_HOLD { 0 } else { divided(i64::from(passed).wrapping_mul(one), length).clamp(0, one) };
+    // Values of at most one in Q28 and lengths below 2^24 multiply to less than 2^54.
+    let share = |x: i64, part: i64, whole: i64| x.wrapping_mul(part).checked_div_euclid(whole).unwrap_or(0);
+    let one = 1i64 << INNER;
+    let t = if time == TIME_HOLD { 0 } else { share(one, i64::from(passed), length).clamp(0, one) };
+    let rounded = |x: i64| {
+        const DROP: u32 = INNER - WEIGHT_BITS;
+        (x.wrapping_add(1 << (DROP - 1)) >> DROP) as i32
+    };
     if time != TIME_CUBIC {
-        let t = t as i32;
+        let t = rounded(t);
         return [[0, ONE.wrapping_sub(t), t, 0]; 4];
     }
-    let down = |x: i64| x.wrapping_add(one / 2) >> WEIGHT_BITS;
-    let square = down(t.wrapping_mul(t));
-    let cube = down(square.wrapping_mul(t));
+    let square = t.wrapping_mul(t) >> INNER;
+    let cube = square.wrapping_mul(t) >> INNER;
     // The Hermite basis: the second value, the two tangents.
     let value = square.wrapping_mul(3).wrapping_sub(cube.wrapping_mul(2));
     let leaving = cube.wrapping_sub(square.wrapping_mul(2)).wrapping_add(t);
     let arriving = cube.wrapping_sub(square);
     let set = |missing: usize| {
         let (first, last) = (missing & 1 == 0, missing & 2 == 0);
-        let leave = if first { divided(leaving.wrapping_mul(length), before.wrapping_add(length)) } else { leaving };
-        let arrive = if last { divided(arriving.wrapping_mul(length), length.wrapping_add(after)) } else { arriving };
-        let w0 = if first { leave.wrapping_neg() } else { 0 };
-        let w3 = if last { arrive } else { 0 };
+        let leave = if first { share(leaving, length, before.wrapping_add(length)) } else { leaving };
+        let arrive = if last { share(arriving, length, length.wrapping_add(after)) } else { arriving };
+        let w0 = if first { rounded(leave.wrapping_neg()) } else { 0 };
+        let w3 = if last { rounded(arrive) } else { 0 };
         // A missing key's tangent is the secant of the interval itself.
-        let w2 = value.wrapping_add(leave).wrapping_add(if last { 0 } else { arrive });
-        let w1 = one.wrapping_sub(w0).wrapping_sub(w2).wrapping_sub(w3);
-        [w0, w1, w2, w3].map(|w| w as i32)
+        let w2 = rounded(value.wrapping_add(leave).wrapping_add(if last { 0 } else { arrive }));
+        [w0, ONE.wrapping_sub(w0).wrapping_sub(w2).wrapping_sub(w3), w2, w3]
     };
     [set(0), set(1), set(2), set(3)]
 }
@@ -88,7 +94,10 @@ impl Bundle<'_> {
         let interval = after.saturating_sub(1).min(self.intervals().saturating_sub(1));
         let at = interval as isize;
         let lengths = [self.interval_length(at.wrapping_sub(1)), self.interval_length(at), self.interval_length(at.wrapping_add(1))];
-        Moment { interval, weights: weights(self.path().time, lengths, frame.saturating_sub(self.interval_start(interval))) }
+        let passed = frame.saturating_sub(self.interval_start(interval));
+        let time = self.path().time;
+        let [[_, _, linear, _], ..] = weights(time.min(TIME_LINEAR), lengths, passed);
+        Moment { interval, weights: weights(time, lengths, passed), linear }
     }
 
     /// The place of key `key`'s record, `run` records after the last independent one.
@@ -108,7 +117,6 @@ impl Bundle<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::format::TIME_LINEAR;
 
     #[test]
     fn weights_sum_to_one_and_are_exact_at_both_keys() {

@@ -1,1 +1,8 @@
-//! What the tests share.
+//! What the tests and the tables share: scenes made small, bundles played whole, the f64 player, figures and goldens.
+//! Scenes come from the baker, bundles go through the core's player; the files beside `src` assert.
+
+pub mod figures;
+pub mod golden;
+pub mod play;
+pub mod reference;
+pub mod scenes;

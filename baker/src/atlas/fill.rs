@@ -3,9 +3,8 @@
 
 use super::pack::Layout;
 use super::{Place, Seen};
-use crate::chart::Charting;
-use crate::chart::{NONE, Projection};
-use crate::gbuffer::Hits;
+use crate::chart::{Charting, NONE, Projection};
+use crate::gbuffer::{Hits, Sample};
 use crate::scene::Scene;
 use crate::shade::{Shader, is_hole};
 use glam::Vec3;
@@ -22,11 +21,17 @@ pub(super) struct Filled {
     pub covered: Vec<bool>,
 }
 
-/// One texel of a chart while its colours are added up.
+/// What one colour sample of a texel shows: of several faces the one in front.
 #[derive(Clone, Copy)]
-struct Texel {
-    sum: Vec3,
-    samples: f32,
+struct Spot {
+    face: u32,
+    bary: [f64; 2],
+    depth: f64,
+}
+
+/// What the camera sees of a texel: its first sample, and how deep that is.
+struct Reference {
+    sample: Sample,
     depth: f64,
 }
 
@@ -110,86 +115,89 @@ impl Patch<'_> {
         }
     }
 
-    /// The first sample that falls into a texel of the chart: (face, sample).
-    fn first(&self, x: u32, y: u32) -> Option<(u32, crate::gbuffer::Sample)> {
+    /// The first sample that falls into a texel of the chart.
+    fn first(&self, x: u32, y: u32) -> Option<Reference> {
         let texel = ((self.place.rect[1] + y) * self.layout.width + self.place.rect[0] + x) as usize;
         let sample = *self.hits.samples.get(self.seen.first[texel] as usize)?;
         let face = *self.charting.faces.of.get(sample.surface as usize)?;
-        (face != NONE).then_some((face, sample))
+        (face != NONE).then(|| Reference { sample, depth: self.charting.flat(face as usize, f64::from(sample.b), f64::from(sample.c))[2] })
+    }
+
+    /// Colour samples a texel has in each direction: one where texels are copied.
+    fn fine(&self) -> u32 {
+        let copied = matches!(self.charting.charts[self.chart].projection, Projection::Texture) && self.layout.scale >= 1.0;
+        if copied { 1 } else { 2 }
     }
 
     /// The chart's texels, row-major; `None` where it shows nothing.
     fn colour(&self, faces: &[u32]) -> Vec<Option<Vec3>> {
         let [x0, y0, x1, y1] = self.place.rect;
         let (width, height) = (x1 - x0, y1 - y0);
-        let mut texels = vec![Texel { sum: Vec3::ZERO, samples: 0.0, depth: f64::NAN }; (width * height) as usize];
-        let firsts: Vec<_> = (0..height).flat_map(|y| (0..width).map(move |x| self.first(x, y))).collect();
-        for (texel, first) in texels.iter_mut().zip(&firsts) {
-            if let Some((face, s)) = first {
-                texel.depth = self.charting.flat(*face as usize, f64::from(s.b), f64::from(s.c))[2];
-            }
-        }
+        let references: Vec<_> = (0..height).flat_map(|y| (0..width).map(move |x| self.first(x, y))).collect();
+        let fine = self.fine();
+        let mut spots = vec![Spot { face: NONE, bary: [0.0; 2], depth: f64::NEG_INFINITY }; (width * height * fine * fine) as usize];
         for &face in faces {
-            self.draw(face, width, height, &firsts, &mut texels);
+            self.draw(face, width, &references, &mut spots);
         }
         let size = self.texel_size();
-        let finish = |(texel, first): (&Texel, &Option<(u32, crate::gbuffer::Sample)>)| {
-            if texel.samples > 0.0 {
-                return Some(texel.sum / texel.samples);
+        let finish = |(i, reference): (usize, &Option<Reference>)| {
+            let (x, y) = (i as u32 % width * fine, i as u32 / width * fine);
+            let (mut sum, mut count) = (Vec3::ZERO, 0.0);
+            for j in 0..fine {
+                for k in 0..fine {
+                    let spot = &spots[((y + j) * width * fine + x + k) as usize];
+                    if spot.face != NONE {
+                        sum += self.shader.shade(self.charting.faces.list[spot.face as usize].surface, spot.bary, size / f64::from(fine));
+                        count += 1.0;
+                    }
+                }
+            }
+            if count > 0.0 {
+                return Some(sum / count);
             }
             // Too thin for a sample of its own, but seen.
-            first.as_ref().map(|(_, s)| self.shader.shade(s.surface, [f64::from(s.b), f64::from(s.c)], size))
+            reference.as_ref().map(|r| self.shader.shade(r.sample.surface, [f64::from(r.sample.b), f64::from(r.sample.c)], size))
         };
-        texels.iter().zip(&firsts).map(finish).collect()
+        references.iter().enumerate().map(finish).collect()
     }
 
-    /// Adds one face: 2x2 samples a texel, one where texels are copied.
-    fn draw(&self, face: u32, width: u32, height: u32, firsts: &[Option<(u32, crate::gbuffer::Sample)>], texels: &mut [Texel]) {
+    /// Lays one face over the samples it is in front of.
+    fn draw(&self, face: u32, width: u32, references: &[Option<Reference>], spots: &mut [Spot]) {
         let Place { rect, origin, step } = self.place;
-        let copied = matches!(self.charting.charts[self.chart].projection, Projection::Texture) && self.layout.scale >= 1.0;
-        let fine = if copied { 1.0 } else { 2.0 };
+        let fine = self.fine();
         let corners = self.charting.corners[face as usize];
-        let [p, q, r] = corners.map(|c| [0, 1].map(|k| (origin[k] + c[k] * step[k] - f64::from(rect[k])) * fine));
+        let [p, q, r] = corners.map(|c| [0, 1].map(|k| (origin[k] + c[k] * step[k] - f64::from(rect[k])) * f64::from(fine)));
         let det = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
         if det.abs() < 1e-12 {
             return;
         }
         let surface = self.charting.faces.list[face as usize].surface;
-        let size = self.texel_size();
         let cosine = match self.charting.charts[self.chart].projection {
             Projection::Plane(axes) => self.charting.faces.list[face as usize].normal.dot(axes[2]).abs().max(0.2),
             Projection::Texture => 1.0,
         };
-        let reach = size * (3.0 + 3.0 * (1.0 / (cosine * cosine) - 1.0).sqrt());
-        let range = |k: usize, most: u32| {
+        let reach = self.texel_size() * (3.0 + 3.0 * (1.0 / (cosine * cosine) - 1.0).sqrt());
+        let range = |k: usize| {
             let (lo, hi) = (p[k].min(q[k]).min(r[k]), p[k].max(q[k]).max(r[k]));
-            let most = f64::from(most) * fine;
+            let most = f64::from((rect[k + 2] - rect[k]) * fine);
             ((lo - 0.5).ceil().clamp(0.0, most) as u32)..((hi + 0.5).floor().clamp(0.0, most) as u32)
         };
-        for j in range(1, height) {
-            for i in range(0, width) {
+        for j in range(1) {
+            for i in range(0) {
                 let at = [f64::from(i) + 0.5 - p[0], f64::from(j) + 0.5 - p[1]];
                 let b = (at[0] * (r[1] - p[1]) - at[1] * (r[0] - p[0])) / det;
                 let c = ((q[0] - p[0]) * at[1] - (q[1] - p[1]) * at[0]) / det;
                 if b.min(c).min(1.0 - b - c) < -1e-9 || is_hole(self.scene, surface / 2, [b, c]) {
                     continue;
                 }
-                let index = ((f64::from(j) / fine) as u32 * width + (f64::from(i) / fine) as u32) as usize;
                 let depth = self.charting.flat(face as usize, b, c)[2];
-                let texel = &mut texels[index];
-                let nearer = depth - texel.depth;
-                if nearer.abs() > reach {
-                    // What the camera sees decides; where it sees nothing, what lies in front.
-                    if firsts[index].is_some() || nearer < 0.0 {
-                        continue;
-                    }
-                    *texel = Texel { sum: Vec3::ZERO, samples: 0.0, depth };
+                // What the camera sees decides; where it sees nothing, what lies in front. Of equals the first, as in
+                // ray casting.
+                let seen = references[(j / fine * width + i / fine) as usize].as_ref();
+                let spot = &mut spots[(j * width * fine + i) as usize];
+                if seen.is_none_or(|r| (depth - r.depth).abs() <= reach) && depth > spot.depth + 1e-9 * depth.abs() {
+                    *spot = Spot { face, bary: [b, c], depth };
                 }
-                if texel.depth.is_nan() {
-                    texel.depth = depth;
-                }
-                texel.sum += self.shader.shade(surface, [b, c], size / fine);
-                texel.samples += 1.0;
             }
         }
     }

@@ -249,3 +249,6 @@ fn outline(charting: &Charting, layout: &pack::Layout, label_of: &[u16], count: 
         })
         .collect()
 }
+
+#[cfg(test)]
+mod tests;

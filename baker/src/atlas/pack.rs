@@ -5,8 +5,8 @@ use super::Place;
 use crate::chart::Charting;
 use guillotiere::{AllocatorOptions, AtlasAllocator, size2};
 
-/// Texels between charts where there is room, and where there is not.
-const GUTTERS: [u32; 2] = [6, 2];
+/// Texels between charts where there is room, where there is not, and where nothing else fits.
+const GUTTERS: [u32; 3] = [6, 2, 0];
 /// How much denser the narrow gutter has to make the image to be preferred.
 const WORTH: f64 = 1.15;
 
@@ -76,12 +76,15 @@ fn fit(charting: &Charting, backdrop: [u32; 2], side: u32, gutter: u32) -> Optio
 /// Packs everything into sides of at most `max_side`; `None` if not even charts of one texel fit.
 pub(super) fn pack(charting: &Charting, backdrop: [u32; 2], max_side: u32) -> Option<Layout> {
     // The width is a power of two: a side in between limits the height only.
-    let side = 1 << max_side.ilog2();
+    let (side, max_side) = (1 << max_side.ilog2(), max_side / 4 * 4);
     let (wide, narrow) = (fit(charting, backdrop, side, GUTTERS[0]), || fit(charting, backdrop, side, GUTTERS[1]));
     let (scale, gutter) = match wide {
         Some(scale) if scale >= 1.0 => (scale, GUTTERS[0]),
         Some(scale) => narrow().filter(|n| *n > scale * WORTH).map_or((scale, GUTTERS[0]), |n| (n, GUTTERS[1])),
-        None => (narrow()?, GUTTERS[1]),
+        None => match narrow() {
+            Some(scale) => (scale, GUTTERS[1]),
+            None => (fit(charting, backdrop, side, GUTTERS[2])?, GUTTERS[2]),
+        },
     };
     let mut width = 64;
     while width <= side {

@@ -82,5 +82,31 @@ fn cluster(weighted: &[([u8; 3], u64)], size: usize) -> Vec<[u8; 3]> {
     }
     palette.iter_mut().for_each(|c| *c = widened(*c));
     tidy(&mut palette);
+    // Rounding makes entries equal: the freed ones go where they help most.
+    for _ in 0..ROUNDS {
+        if palette.len() >= size {
+            break;
+        }
+        let mut gains: Vec<([u8; 3], u64)> = weighted
+            .par_iter()
+            .map(|&(colour, weight)| {
+                let (now, then) = (palette[nearest(&palette, colour)], widened(colour));
+                (then, weight * u64::from(distance(now, colour).saturating_sub(distance(then, colour))))
+            })
+            .filter(|g| g.1 > 0)
+            .collect();
+        gains.par_sort_unstable();
+        gains.dedup_by(|next, kept| {
+            next.0 == kept.0 && {
+                kept.1 += next.1;
+                true
+            }
+        });
+        gains.sort_by_key(|g| (std::cmp::Reverse(g.1), g.0));
+        // Half of them at a time, since each changes what the others gain.
+        let room = size - palette.len();
+        palette.extend(gains.iter().take(room.div_ceil(2)).map(|g| g.0));
+        tidy(&mut palette);
+    }
     palette
 }

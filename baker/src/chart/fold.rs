@@ -9,6 +9,8 @@ use std::collections::VecDeque;
 
 /// The share of a face's texels that may lie over others before it has to go.
 const TOLERATED: usize = 8;
+/// Parts seen by a smaller share of all pixels stay where they are: 150 in 128 frames of 320x240.
+const FEW: f64 = 150.0 / 9.8e6;
 /// States of a face while its chart is examined.
 const OUTSIDE: u8 = 0;
 const WAITING: u8 = 1;
@@ -62,11 +64,16 @@ pub(super) fn split(hits: &Hits, charting: &mut Charting, links: &Links) -> bool
         members[c as usize].push(f as u32);
     }
     let mut found = false;
+    let few = (FEW * hits.samples.len() as f64) as u64;
     let mut state = vec![OUTSIDE; charting.faces.list.len()];
     let mut work: VecDeque<(u32, Vec<u32>)> = members.into_iter().enumerate().map(|(c, m)| (c as u32, m)).collect();
     while let Some((chart, faces)) = work.pop_front() {
         let rejected = examine(charting, links, &faces, chart, &mut state, |f| &touches[first[f as usize]..first[f as usize + 1]]);
         for part in rejected {
+            // A few wrong pixels cost less than another chart.
+            if part.iter().map(|&f| u64::from(charting.faces.list[f as usize].hits)).sum::<u64>() < few {
+                continue;
+            }
             found = true;
             let id = charting.charts.len() as u32;
             let copy = charting.charts[chart as usize].clone();

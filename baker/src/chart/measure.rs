@@ -160,9 +160,9 @@ pub(super) fn bound(hits: &Hits, charting: &mut Charting) {
         let id = charting.faces.of[s.surface as usize] as usize;
         let flat = charting.flat(id, f64::from(s.b), f64::from(s.c));
         let chart = &mut charting.charts[charting.chart_of[id] as usize];
-        for k in 0..2 {
-            chart.lo[k] = chart.lo[k].min(flat[k]);
-            chart.hi[k] = chart.hi[k].max(flat[k]);
+        for ((lo, hi), v) in chart.lo.iter_mut().zip(&mut chart.hi).zip(flat) {
+            *lo = lo.min(v);
+            *hi = hi.max(v);
         }
         chart.hits += 1;
     }

@@ -71,7 +71,7 @@ impl Links {
     }
 }
 
-/// Whether the surface goes on between two neighbouring pixels: atlas prototype's test, a gap under 3 footprints or a
+/// Whether the surface goes on between two neighbouring pixels: a gap under 3 pixel footprints, or a
 /// step out of either plane under 0.7.
 fn continuous(lens: &Lens, faces: [&Face; 2], points: [DVec3; 2]) -> bool {
     let step = points[1] - points[0];

@@ -4,13 +4,14 @@
 mod range;
 
 use crate::atlas::SourceImage;
+use crate::fields::Fields;
 use crate::fit::Fit;
 use crate::gbuffer::GBuffer;
 use crate::sheets::{KeyGrid, Layers, Sheets};
 use cubist_core::coder::Probability;
-use cubist_core::fixed::KEY_BITS;
+use cubist_core::fixed::{KEY_BITS, KEY_MAX, KEY_MIN, field_code};
 use cubist_core::format::{
-    ATLAS, Atlas, Envelope, FIXED, INFO, KeyEntry, LABELS, LabelRecord, Limits, MAGIC, MASK, MASKED, PATH, Path, Section, VERSION,
+    ATLAS, Atlas, Envelope, FIXED, INFO, KeyEntry, LABELS, LabelRecord, Limits, MAGIC, MASK, MASKED, PATH, Path, STRIP, Section, VERSION,
 };
 use cubist_core::key::{self, Key, Source, Trace};
 use cubist_core::lists::{self, Lists};
@@ -20,7 +21,7 @@ use range::Encoder;
 /// How keys are coded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CodingSettings {
-    /// Coordinates are stored in steps of 2^this / 64 texel.
+    /// Coordinates are stored in steps of 2^this / 32 texel.
     pub step_log2: u8,
     /// What a bit is worth, in squared texels of error summed over pixels, when residuals of ghosts are
     /// rounded towards zero; 0 keeps them all.
@@ -48,11 +49,15 @@ pub fn bundle(
     sheets: &Sheets,
     layers: &Layers,
     fit: &Fit,
+    fields: &Fields,
     settings: CodingSettings,
     frame: Frame<'_>,
 ) -> Vec<u8> {
-    let labels: Vec<LabelRecord> = image.labels.iter().map(label_record).collect();
-    let (table, records) = keys(gbuffer, grid, sheets, layers, fit, &labels, settings);
+    let mut labels: Vec<LabelRecord> = image.labels.iter().map(label_record).collect();
+    for (record, &strip) in labels.iter_mut().zip(&fields.strip) {
+        record.flags |= if strip { STRIP } else { 0 };
+    }
+    let (table, records) = keys(gbuffer, grid, sheets, layers, fit, fields, &labels, settings);
     let path = Path {
         width: gbuffer.width as u16,
         height: gbuffer.height as u16,
@@ -62,7 +67,7 @@ pub fn bundle(
         cell_log2: grid.grid.log2 as u8,
         time: grid.time,
         step_log2: settings.step_log2,
-        limits: limits(grid, sheets, layers, settings),
+        limits: limits(grid, sheets, layers, &labels, settings),
         table: &table,
         records: &records,
     };
@@ -122,8 +127,17 @@ fn label_record(label: &crate::atlas::Label) -> LabelRecord {
     record
 }
 
+/// Fields that layers have to carry for the tests in `sheets`.
+fn fields_used(sheets: &Sheets, labels: &[LabelRecord]) -> u8 {
+    let per_sheet = |(list, &tests): (&Vec<u8>, &u16)| {
+        let tested = list.iter().enumerate().filter(move |(at, _)| tests >> (2 * at) & 3 != lists::CHART);
+        tested.map(|(_, &label)| if labels[usize::from(label)].flags & STRIP != 0 { 2 } else { 1 }).max()
+    };
+    sheets.lists.iter().zip(&sheets.tests).filter_map(per_sheet).max().unwrap_or(0)
+}
+
 /// The bounds that the lists and layers keep.
-fn limits(grid: &KeyGrid, sheets: &Sheets, layers: &Layers, settings: CodingSettings) -> Limits {
+fn limits(grid: &KeyGrid, sheets: &Sheets, layers: &Layers, labels: &[LabelRecord], settings: CodingSettings) -> Limits {
     let (cells, nodes) = (grid.grid.cells(), grid.grid.nodes());
     let count = |from: usize, to: usize| (layers.start[to] - layers.start[from]) as usize;
     let most = |values: &mut dyn Iterator<Item = usize>| u16::try_from(values.max().unwrap_or(0)).unwrap_or(u16::MAX);
@@ -132,8 +146,9 @@ fn limits(grid: &KeyGrid, sheets: &Sheets, layers: &Layers, settings: CodingSett
     Limits {
         key_layers: most(&mut (0..grid.keys.len()).map(|key| count(key * nodes, (key + 1) * nodes))),
         row_layers: most(&mut (0..grid.keys.len() * grid.grid.node_rows()).map(|row| count(row * width, (row + 1) * width))),
-        list_bytes: most(&mut sheets.lists.chunks(cells).map(|lists| lists.iter().map(|list| 1 + list.len()).sum())),
+        list_bytes: most(&mut sheets.lists.chunks(cells).map(|lists| lists.iter().map(|list| lists::bytes(list.len())).sum())),
         row_sheets: most(&mut sheets.lists.chunks(grid.grid.columns).map(|lists| lists.iter().map(Vec::len).sum())),
+        fields: fields_used(sheets, labels),
         cell_sheets: sheets.lists.iter().map(Vec::len).max().unwrap_or(1) as u8,
         seek_keys: (settings.independent_every.clamp(1, grid.keys.len()) + back + ahead) as u16,
     }
@@ -146,10 +161,11 @@ fn keys(
     sheets: &Sheets,
     layers: &Layers,
     fit: &Fit,
+    fields: &Fields,
     labels: &[LabelRecord],
     settings: CodingSettings,
 ) -> (Vec<u8>, Vec<u8>) {
-    let bounds = limits(grid, sheets, layers, settings);
+    let bounds = limits(grid, sheets, layers, labels, settings);
     let mut memory = Memory::new(grid, bounds);
     let mut stream = memory.stream();
     let shape = Shape {
@@ -168,7 +184,7 @@ fn keys(
             has_after: position < grid.intervals(),
             lengths: [grid.length(position as isize - 1), grid.length(position as isize - 2)],
         };
-        let mut source = Wanted { gbuffer, grid, sheets, layers, fit, settings, key: position };
+        let mut source = Wanted { gbuffer, grid, sheets, layers, fit, fields, settings, key: position };
         let mut encoder = Encoder::default();
         stream.code(&mut encoder, shape, place, &mut source);
         records.extend(encoder.finish());
@@ -177,11 +193,14 @@ fn keys(
     (table, records)
 }
 
+/// Starts, labels, positions, fields.
+type OneKey = (Vec<u16>, Vec<u8>, Vec<u32>, [Vec<i8>; 2]);
+
 /// The encoder's copy of the memory that the player decodes into.
 struct Memory {
     contexts: [Vec<Probability>; 2],
     traces: Vec<Trace>,
-    keys: [(Vec<u16>, Vec<u8>, Vec<u32>); MAX_KEYS],
+    keys: [OneKey; MAX_KEYS],
     lists: [(Vec<u16>, Vec<u8>); LISTS],
 }
 
@@ -191,7 +210,9 @@ impl Memory {
         Self {
             contexts: [vec![Probability::NEW; lists::CONTEXTS], vec![Probability::NEW; key::CONTEXTS]],
             traces: vec![Trace::default(); 2 * usize::from(limits.row_layers)],
-            keys: std::array::from_fn(|_| (vec![0; grid.grid.nodes() + 1], vec![0; layers], vec![0; layers])),
+            keys: std::array::from_fn(|_| {
+                (vec![0; grid.grid.nodes() + 1], vec![0; layers], vec![0; layers], [vec![0; layers], vec![0; layers]])
+            }),
             lists: std::array::from_fn(|_| (vec![0; grid.grid.rows + 1], vec![0; usize::from(limits.list_bytes)])),
         }
     }
@@ -202,7 +223,7 @@ impl Memory {
             list_contexts,
             key_contexts,
             traces: &mut self.traces,
-            keys: self.keys.each_mut().map(|(start, label, uv)| Key { start, label, uv }),
+            keys: self.keys.each_mut().map(|(start, label, uv, [a, b])| Key { start, label, uv, fields: [a, b] }),
             lists: self.lists.each_mut().map(|(rows, data)| Lists::new(rows, data)),
             slots: MAX_KEYS,
             turn: 0,
@@ -217,6 +238,7 @@ struct Wanted<'a> {
     sheets: &'a Sheets,
     layers: &'a Layers,
     fit: &'a Fit,
+    fields: &'a Fields,
     settings: CodingSettings,
     key: usize,
 }
@@ -237,8 +259,14 @@ impl Source for Wanted<'_> {
     fn sheets(&mut self, ahead: bool, cell: usize) -> lists::Sheets {
         let intervals = self.grid.intervals();
         let interval = if ahead { self.key } else { (self.key + intervals - 1) % intervals };
-        let list = &self.sheets.lists[interval * self.grid.grid.cells() + cell];
-        lists::Sheets::from_slice(list).unwrap_or_default()
+        let index = interval * self.grid.grid.cells() + cell;
+        let labels = self.sheets.lists[index].iter().copied().collect();
+        lists::Sheets { labels, tests: self.sheets.tests[index] }
+    }
+
+    fn field(&mut self, node: usize, label: u8, which: usize) -> i8 {
+        let layer = self.layers.find(self.key * self.grid.grid.nodes() + node, label);
+        layer.map_or(0, |layer| field_code(libm::roundf(self.fields.uv[layer][which] * 256.0) as i32))
     }
 
     fn residual(&mut self, node: usize, label: u8, predicted: [i32; 2], contexts: [&[Probability]; 2]) -> [i32; 2] {
@@ -248,7 +276,7 @@ impl Source for Wanted<'_> {
         let free = self.settings.lambda > 0.0 && !self.visible(node, label);
         let mut residual = [0, 0];
         for axis in 0..2 {
-            let wanted = self.fit.uv[layer][axis].clamp(0.0, 65_535.0 / unit);
+            let wanted = self.fit.uv[layer][axis].clamp(KEY_MIN as f32 / unit, KEY_MAX as f32 / unit);
             let exact = (wanted - predicted[axis] as f32 / unit) / step;
             let nearest = libm::roundf(exact) as i32;
             residual[axis] = nearest;

@@ -48,7 +48,7 @@ const ROOMS: [Room; 4] = [
 ];
 
 pub(super) fn build() -> Scene {
-    let mut builder = Builder::new(512, 1024);
+    let mut builder = Builder::new(512, 912);
     let mut shelf = Shelf::new(512, 0);
     // Kind by kind rather than room by room: shelves fill best with what is of one height.
     for part in [Room::floor, Room::walls, Room::furniture, Room::ceiling] {
@@ -144,10 +144,14 @@ impl Room {
 
     /// A pedestal with a ball, a chest, a drum: the sides that face the camera.
     fn furniture(self, builder: &mut Builder, shelf: &mut Shelf) {
-        self.block(builder, shelf, PEDESTAL, |p, _| masonry(p.x * 40.0 + 400.0, p.y * 40.0, [12.0, 8.0], MARBLE, 71));
+        self.block(builder, shelf, PEDESTAL, |p, face| {
+            let (x, y) = if face == 2 { (p.x, p.z) } else { (p.x + p.z, p.y) };
+            masonry(x * 40.0 + 400.0, y * 40.0 + 400.0, [12.0, 8.0], MARBLE, 71)
+        });
         self.block(builder, shelf, CHEST, |p, face| match face {
             0 => lettering(p.x * 40.0 + 100.0, 22.0 - p.y * 40.0 + 40.0, 72, rgb(250, 240, 200), rgb(36, 66, 132)),
-            _ => checker(p.x * 40.0 + p.z * 40.0, p.y * 40.0, 7.0, [rgb(36, 66, 132), rgb(214, 180, 70)], 73),
+            1 => checker(p.z * 40.0, p.y * 40.0, 7.0, [rgb(36, 66, 132), rgb(214, 180, 70)], 73),
+            _ => checker(p.x * 40.0, p.z * 40.0, 7.0, [rgb(36, 66, 132), rgb(214, 180, 70)], 73),
         });
         let (foot, _, height) = PEDESTAL;
         let middle = DVec3::new(foot.x, height + BALL_RADIUS, foot.y);

@@ -55,7 +55,7 @@ const COLUMNS: [Column; 6] = [
 ];
 
 pub(super) fn build() -> Scene {
-    let mut builder = Builder::new(512, 640);
+    let mut builder = Builder::new(512, 528);
     let sky = Rect::new(3, 3, 506, 112);
     Sky { rect: sky, azimuth: HALF_TURN, elevation: [0.48, -0.08], centre: EYE, radius: 3000.0 }.hang(&mut builder);
     ground(&mut builder);

@@ -9,13 +9,14 @@ use crate::camera::Pose;
 use crate::scene::Scene;
 use glam::DVec3;
 
-const FRONT: [u32; 2] = [56, 40];
+/// Texels across and down a house front.
+const FRONT: [u32; 2] = [64, 40];
 
 pub(super) fn build() -> Scene {
     let mut builder = Builder::new(512, 640);
     let centre = DVec3::new(0.0, 2.8, 4.0);
     // On the last shelf, beside the last four fronts.
-    let sky = Rect::new(259, 523, 250, 96);
+    let sky = Rect::new(283, 569, 226, 63);
     Sky { rect: sky, azimuth: 1.2, elevation: ELEVATION, centre, radius: 7200.0 }.hang(&mut builder);
     ground(&mut builder);
     let mut shelf = Shelf::new(512, 198);

@@ -136,14 +136,19 @@ fn islands_are_injective() {
 fn every_ray_of_the_path_meets_the_front_of_a_surface() {
     for scene in scenes() {
         // The terrain is large; a fold in it would show in any frame.
-        let steps = if scene.triangles.len() > 100_000 { (7, 5) } else { (17, 13) };
+        let steps = if scene.triangles.len() > 100_000 { (24, 16) } else { (80, 120) };
         let mut missed = Vec::new();
         let mut behind = Vec::new();
         for frame in [0, 21, 43, 64, 85, 106, 127] {
             let pose = scene.camera.pose(scene.playback.parameter(f64::from(frame)));
-            for j in 0..steps.1 {
-                for i in 0..steps.0 {
-                    let (x, y) = (f64::from(i) / f64::from(steps.0 - 1) * 320.0, f64::from(j) / f64::from(steps.1 - 1) * 240.0);
+            for j in 0..=steps.1 {
+                for i in 0..=steps.0 {
+                    // All along the border, where the picture reaches furthest; sparsely inside.
+                    let border = i == 0 || j == 0 || i == steps.0 || j == steps.1;
+                    if !border && (i % 4 != 0 || j % 4 != 0) {
+                        continue;
+                    }
+                    let (x, y) = (f64::from(i) / f64::from(steps.0) * 320.0, f64::from(j) / f64::from(steps.1) * 240.0);
                     let direction = pose.direction(320, 240, x, y);
                     let Some((_, hit)) = cast(&scene, pose.eye, direction) else {
                         missed.push((frame, x, y, libm::atan2(direction.x, -direction.z), libm::asin(direction.y)));
@@ -163,7 +168,7 @@ fn every_ray_of_the_path_meets_the_front_of_a_surface() {
 
 #[test]
 fn the_sky_is_linear_in_azimuth_and_elevation() {
-    let skies = [("cone-orbit", 1.3), ("street", 1.2), ("terrain", 1.2), ("arch", 1.1), ("torus", 1.3), ("columns", 1.1)];
+    let skies = [("cone-orbit", 1.3), ("street", 1.2), ("terrain", 1.2), ("arch", 1.1), ("columns", 1.1)];
     for (name, half_azimuth) in skies {
         let scene = build(name).expect("a listed name builds");
         let sky: Vec<_> = scene.triangles.iter().filter(|triangle| triangle.island == Some(0)).collect();

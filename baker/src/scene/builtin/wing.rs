@@ -22,22 +22,25 @@ const BANDS: f64 = 14.0;
 /// Texels: the span, and from the nose to the hindmost tip.
 const SIZE: [u32; 2] = [360, 170];
 
+/// Elevations that the path sees, radians.
+const SKY: [f64; 2] = [1.0, -1.26];
+
 pub(super) fn build() -> Scene {
     let mut builder = Builder::new(512, 512);
     let rect = Rect::new(3, 355, 400, 150);
-    let azimuth = 1.75;
-    Sky { rect, azimuth, elevation: [0.72, -1.12], centre: DVec3::ZERO, radius: 1000.0 }
-        .hang_painted(&mut builder, |_, y| haze(0.72 - 1.84 * y / 150.0));
+    let azimuth = 2.5;
+    Sky { rect, azimuth, elevation: SKY, centre: DVec3::ZERO, radius: 1000.0 }
+        .hang_painted(&mut builder, |_, y| haze(SKY[0] + (SKY[1] - SKY[0]) * y / 150.0));
     side(&mut builder, true);
     side(&mut builder, false);
     builder.finish("wing", path)
 }
 
-/// From above and the left down to a glance at the underside.
+/// From above and the left around the nose, and down to the underside: fast past the moment when the wing is edge-on.
 fn path(s: f64) -> Pose {
-    let (sin, cos) = libm::sincos((-52.0 + 104.0 * s).to_radians());
-    let (up, out) = libm::sincos((36.0 - 52.0 * s).to_radians());
-    look(DVec3::new(out * sin, up, out * cos) * 6.9, DVec3::ZERO, FOCAL)
+    let (sin, cos) = libm::sincos((-46.0 + 92.0 * s).to_radians());
+    let (up, out) = libm::sincos((46.0 - 76.0 * s * s).to_radians());
+    look(DVec3::new(out * sin, up, out * cos) * 6.7, DVec3::ZERO, FOCAL)
 }
 
 /// A clear sky by `elevation`, radians: blue above, bright at the horizon, hazy blue-grey below.
@@ -46,7 +49,7 @@ fn haze(elevation: f64) -> Texel {
     if elevation > 0.0 {
         shade(mix(horizon, rgb(86, 132, 196), (elevation * 1.5).min(1.0)), 1.0)
     } else {
-        shade(mix(horizon, rgb(96, 120, 148), (elevation * -2.2).min(1.0)), 1.0)
+        shade(mix(horizon, rgb(140, 160, 184), (elevation * -1.4).min(1.0)), 1.0)
     }
 }
 
@@ -114,7 +117,7 @@ fn pressure(x: f64, c: f64, top: bool) -> f64 {
     };
     let load = 1.0 - 0.6 * x * x;
     if top {
-        0.16 + 0.85 * (1.0 - libm::exp(-2.6 * c)) * (1.1 - 0.35 * load) + 0.35 * libm::exp(-40.0 * c)
+        0.16 + 0.85 * (1.0 - libm::exp(-2.6 * c)) * (1.1 - 0.35 * load) + 0.3 * libm::exp(-16.0 * c)
             - 0.26 * load * spot(0.0, 0.3, 0.9, 0.3)
             - 0.16 * spot(0.2, 0.34, 0.1, 0.2)
     } else {

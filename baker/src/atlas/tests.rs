@@ -1,0 +1,250 @@
+//! Tests of the way from hits to the source image, on small scenes made here.
+
+use super::*;
+use crate::camera::{Path, Pose};
+use crate::gbuffer::Sample;
+use crate::scene::{Light, Material, Playback, Texture, Triangle, Wrap};
+use crate::trace::Tracer;
+use glam::{DVec3, Vec2, Vec3};
+use std::sync::Arc;
+
+/// A quarter of a circle around the origin.
+struct Arc90 {
+    radius: f64,
+    height: f64,
+}
+
+impl Path for Arc90 {
+    fn pose(&self, s: f64) -> Pose {
+        let angle = 0.2 + 1.5 * s;
+        let eye = DVec3::new(self.radius * libm::sin(angle), self.height, self.radius * libm::cos(angle));
+        Pose::look_at(eye, DVec3::ZERO, DVec3::Y, 45.0)
+    }
+}
+
+fn scene(triangles: Vec<Triangle>, textures: Vec<Texture>, material: Material) -> Scene {
+    Scene {
+        name: "test".into(),
+        triangles,
+        materials: vec![material],
+        textures,
+        background: Background::Colour([32, 40, 48]),
+        lights: Vec::new(),
+        camera: Arc::new(Arc90 { radius: 4.0, height: 1.6 }),
+        playback: Playback { width: 120, height: 90, frames: 20, fps: 30, looping: false },
+        warnings: Vec::new(),
+    }
+}
+
+/// Two triangles; `corners` counter-clockwise from the bottom left of the texture.
+fn quad(corners: [DVec3; 4]) -> [Triangle; 2] {
+    let uv = [Vec2::Y, Vec2::ONE, Vec2::X, Vec2::ZERO];
+    [[0, 1, 2], [0, 2, 3]].map(|i| Triangle {
+        position: i.map(|k: usize| corners[k]),
+        normal: [Vec3::ZERO; 3],
+        uv: i.map(|k| uv[k]),
+        colour: [Vec3::ONE; 3],
+        material: 0,
+        island: None,
+    })
+}
+
+/// Smooth diagonal stripes, few colours: the palette is not what is tested. Holes of alpha 0 where `hole` says so.
+fn texture(size: u32, hole: impl Fn(u32, u32) -> bool) -> Texture {
+    let wave = |v: u32| (127.5 + 100.0 * libm::sin(f64::from(v) * core::f64::consts::TAU / f64::from(size))) as u8;
+    let texel = |i: u32| {
+        let (x, y) = (i % size, i / size);
+        [wave(x + 2 * y), 255 - wave(x + 2 * y), 90, if hole(x, y) { 0 } else { 255 }]
+    };
+    Texture { width: size, height: size, texels: (0..size * size).map(texel).collect(), wrap: [Wrap::Repeat; 2] }
+}
+
+fn cube() -> Scene {
+    let mut triangles = Vec::new();
+    for (right, up) in [
+        (DVec3::X, DVec3::Y),
+        (DVec3::NEG_Z, DVec3::Y),
+        (DVec3::NEG_X, DVec3::Y),
+        (DVec3::Z, DVec3::Y),
+        (DVec3::X, DVec3::NEG_Z),
+        (DVec3::X, DVec3::Z),
+    ] {
+        let n = right.cross(up);
+        triangles.extend(quad([n - right - up, n + right - up, n + right + up, n - right + up]));
+    }
+    scene(triangles, vec![texture(64, |_, _| false)], Material { texture: Some(0), ..Default::default() })
+}
+
+fn hill() -> Scene {
+    let point = |i: i32, j: i32| {
+        let (x, z) = (f64::from(i - 20) * 0.2, f64::from(j - 20) * 0.2);
+        DVec3::new(x, 1.1 * libm::exp(-(x * x + z * z) * 0.8) - 0.5, z)
+    };
+    let mut triangles: Vec<Triangle> = (0..40)
+        .flat_map(|i| (0..40).flat_map(move |j| quad([point(i, j + 1), point(i + 1, j + 1), point(i + 1, j), point(i, j)])))
+        .collect();
+    for t in &mut triangles {
+        t.colour = t.position.map(|p| Vec3::new(0.4 + 0.1 * p.x as f32, 0.6 + 0.3 * p.y as f32, 0.5 - 0.1 * p.z as f32));
+    }
+    let mut s = scene(triangles, Vec::new(), Material::default());
+    s.lights.push(Light { direction: Vec3::new(-1.0, -2.0, -1.0).normalize(), colour: Vec3::ONE, intensity: 1.0 });
+    s
+}
+
+fn crossing() -> Scene {
+    let plane = |right: DVec3| quad([-right - DVec3::Y, right - DVec3::Y, right + DVec3::Y, -right + DVec3::Y]);
+    let triangles = [plane(DVec3::X), plane(DVec3::Z)].concat();
+    let hole = |x: u32, y: u32| (20..36).contains(&x) && (10..30).contains(&y);
+    scene(triangles, vec![texture(64, hole)], Material { texture: Some(0), alpha_cutoff: Some(0.5), ..Default::default() })
+}
+
+fn hits(scene: &Scene) -> Hits {
+    Hits::cast(scene, &Tracer::new(scene), &|_, _| {})
+}
+
+fn made(scene: &Scene, hits: &Hits) -> Atlas {
+    build(scene, hits, &Settings::default(), &|_, _| {}).expect("an atlas")
+}
+
+fn seen<'a>(hits: &'a Hits, atlas: &'a Atlas) -> impl Iterator<Item = (&'a Sample, u16, [f32; 2])> {
+    hits.samples.iter().zip(&atlas.gbuffer.label).zip(&atlas.gbuffer.uv).map(|((s, &l), &uv)| (s, l, uv))
+}
+
+fn texel(image: &SourceImage, uv: [f32; 2]) -> usize {
+    uv[1] as usize * image.width as usize + uv[0] as usize
+}
+
+/// Decibels of the source image's nearest texel against the shade itself, over the pixels that see a surface.
+fn psnr(scene: &Scene, hits: &Hits, atlas: &Atlas) -> f64 {
+    let shader = Shader::new(scene);
+    let (mut error, mut count) = (0.0, 0.0);
+    for (s, _, uv) in seen(hits, atlas).filter(|(s, ..)| s.surface != BACKGROUND) {
+        let truth = shader.shade(s.surface, [f64::from(s.b), f64::from(s.c)], 0.0);
+        let shown = atlas.image.palette[usize::from(atlas.image.texels[texel(&atlas.image, uv)])];
+        error += f64::from((truth - Vec3::from(shown.map(f32::from))).length_squared());
+        count += 3.0;
+    }
+    10.0 * libm::log10(65025.0 * count / error)
+}
+
+#[test]
+fn the_source_image_shows_what_shading_shows() {
+    for (name, scene, bound) in [("cube", cube(), 33.0), ("hill", hill(), 33.0), ("crossing", crossing(), 31.0)] {
+        let hits = hits(&scene);
+        let atlas = made(&scene, &hits);
+        let psnr = psnr(&scene, &hits, &atlas);
+        println!("{name}: {psnr:.1} dB, {:?}", atlas.figures);
+        assert!(psnr > bound, "{name}: {psnr} dB, expected more than {bound}");
+    }
+}
+
+#[test]
+fn coordinates_stay_in_covered_texels_of_their_label() {
+    for scene in [cube(), hill(), crossing()] {
+        let hits = hits(&scene);
+        let Atlas { image, .. } = &made(&scene, &hits);
+        assert!(image.width.is_power_of_two() && image.height.is_multiple_of(4));
+        assert!(image.palette.iter().all(|&c| palette::widened(c) == c));
+        for (s, label, uv) in seen(&hits, &made(&scene, &hits)) {
+            let [x0, y0, x1, y1] = image.labels[usize::from(label)].rect.map(f32::from);
+            assert_eq!(label == 0, s.surface == BACKGROUND);
+            assert!(uv[0] >= x0 && uv[0] < x1 && uv[1] >= y0 && uv[1] < y1, "{uv:?} outside {:?}", [x0, y0, x1, y1]);
+            assert!(image.covered[texel(image, uv)], "{uv:?} is not covered");
+        }
+    }
+}
+
+#[test]
+fn charts_are_injective() {
+    for scene in [cube(), hill(), crossing()] {
+        let hits = hits(&scene);
+        let atlas = made(&scene, &hits);
+        let point = |s: &Sample| {
+            let [p, q, r] = scene.triangles[(s.surface / 2) as usize].position;
+            p * (1.0 - f64::from(s.b) - f64::from(s.c)) + q * f64::from(s.b) + r * f64::from(s.c)
+        };
+        // The first point seen in each half texel of the image; a texel is about a pixel, 0.03 units here.
+        let width = atlas.image.width as usize * 2;
+        let mut first: Vec<Option<DVec3>> = vec![None; width * atlas.image.height as usize * 2];
+        for (s, _, uv) in seen(&hits, &atlas).filter(|(s, ..)| s.surface != BACKGROUND) {
+            let other = *first[(uv[1] * 2.0) as usize * width + (uv[0] * 2.0) as usize].get_or_insert(point(s));
+            assert!(other.distance(point(s)) < 0.25, "{other} and {} share {uv:?}", point(s));
+        }
+    }
+}
+
+#[test]
+fn threads_do_not_matter() {
+    let scene = hill();
+    let on = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+        pool.install(|| {
+            let hits = hits(&scene);
+            let atlas = made(&scene, &hits);
+            (hits.samples, atlas.image.texels, atlas.image.palette, atlas.gbuffer.label, atlas.gbuffer.uv)
+        })
+    };
+    assert!(on(1) == on(2));
+}
+
+#[test]
+fn a_scenes_own_flattening_is_kept() {
+    let mut scene = cube();
+    for (i, t) in scene.triangles.iter_mut().enumerate() {
+        t.island = Some(i as u16 / 2);
+        // Six squares of 16 texels, 2 apart.
+        let corner = Vec2::new((i as u16 / 2 % 3) as f32 * 18.0, (i as u16 / 6) as f32 * 18.0);
+        t.uv = t.uv.map(|uv| (corner + uv * 16.0) / 64.0);
+    }
+    let hits = hits(&scene);
+    let atlas = made(&scene, &hits);
+    for label in &atlas.image.labels[1..] {
+        let [x0, y0, x1, y1] = label.rect;
+        assert_eq!((x1 - x0, y1 - y0, label.masked), (16, 16, false));
+    }
+    let texels = &scene.textures[0].texels;
+    for (s, _, uv) in seen(&hits, &atlas).filter(|(s, ..)| s.surface != BACKGROUND) {
+        let t = &scene.triangles[(s.surface / 2) as usize];
+        let at = (t.uv[0] * (1.0 - s.b - s.c) + t.uv[1] * s.b + t.uv[2] * s.c) * 64.0;
+        if at.fract().min_element() < 0.01 || at.fract().max_element() > 0.99 {
+            continue;
+        }
+        let [r, g, b, _] = texels[at.y as usize * 64 + at.x as usize];
+        let shown = atlas.image.palette[usize::from(atlas.image.texels[texel(&atlas.image, uv)])];
+        assert!(shown.iter().zip([r, g, b]).all(|(a, b)| a.abs_diff(b) < 16), "{shown:?} for {:?}", [r, g, b]);
+    }
+}
+
+#[test]
+fn a_background_picture_keeps_to_the_screen() {
+    let mut scene = cube();
+    scene.background = Background::Image(texture(64, |_, _| false));
+    let hits = hits(&scene);
+    let atlas = made(&scene, &hits);
+    let fixed = atlas.image.labels[0].fixed.expect("the background is fixed");
+    let shader = Shader::new(&scene);
+    let mut worst = 0f32;
+    for (i, (s, label, uv)) in seen(&hits, &atlas).enumerate().filter(|(_, (s, ..))| s.surface == BACKGROUND) {
+        let (x, y) = ((i % 120) as f32 + 0.5, (i / 120 % 90) as f32 + 0.5);
+        assert_eq!((label, s.surface), (0, BACKGROUND));
+        assert!((uv[0] - fixed.origin[0] - x * fixed.step[0]).abs() < 1e-3 && (uv[1] - fixed.origin[1] - y * fixed.step[1]).abs() < 1e-3);
+        let shown = atlas.image.palette[usize::from(atlas.image.texels[texel(&atlas.image, uv)])];
+        worst = worst.max((shader.background(f64::from(x), f64::from(y)) - Vec3::from(shown.map(f32::from))).abs().max_element());
+    }
+    assert!(worst < 40.0, "off by {worst}");
+}
+
+#[test]
+fn settings_out_of_range_are_errors() {
+    let scene = cube();
+    let hits = hits(&scene);
+    for max_side in [0, 63, 1025] {
+        let settings = Settings { max_side, ..Default::default() };
+        assert_eq!(build(&scene, &hits, &settings, &|_, _| {}).err(), Some(AtlasError::Side(max_side)));
+    }
+    for max_side in [64, 100, 1024] {
+        let settings = Settings { max_side, ..Default::default() };
+        let image = build(&scene, &hits, &settings, &|_, _| {}).expect("an atlas").image;
+        assert!(image.width <= max_side && image.height <= max_side);
+    }
+}

@@ -1,0 +1,188 @@
+//! Fields: signed distances on the screen from a sheet's outline, positive where the sheet shows; one number a layer,
+//! interpolated like a position. They tell curved silhouettes, where the chart goes on beyond what is seen.
+//! Fitted to the G-buffer like positions are; `order` decides where they are used.
+//!
+//! Things thinner than a cell are *strips*: two fields, the distances from two opposite sides, both positive inside.
+
+use crate::fit::{self, Problem};
+use crate::gbuffer::GBuffer;
+use crate::sheets::{KeyGrid, Layers, Sheets};
+use cubist_core::fixed::{field_code, field_distance};
+use cubist_core::format::TIME_LINEAR;
+use rayon::prelude::*;
+
+/// Distances are told apart up to this many cells.
+const REACH: f32 = 1.5;
+/// How fast a pixel's say falls with its distance from the outline, pixels: the outline has to be right, not the middle.
+const FALLOFF: f32 = 2.0;
+
+/// The fields of all layers.
+#[derive(Clone, Debug)]
+pub struct Fields {
+    /// Two distances a layer, pixels, as the player will have them.
+    pub uv: Vec<[f32; 2]>,
+    /// Labels that are strips.
+    pub strip: Vec<bool>,
+}
+
+/// The distances from a pixel to the nearest change between a sheet and what lies behind it: left, right, up, down, pixels;
+/// `None` within reach.
+type Distances = [Option<f32>; 4];
+
+/// Fits the fields of all layers, given the sheets front to back.
+#[must_use]
+pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers, labels: usize) -> Fields {
+    let thin = thin_labels(gbuffer, grid, sheets, labels);
+    let reach = REACH * (1u32 << grid.grid.log2) as f32;
+    let target = |index: usize, sheet: usize, pixel: usize| {
+        let list = &sheets.lists[index];
+        if list.len() < 2 {
+            return None;
+        }
+        let seen = list.iter().position(|&label| gbuffer.label[pixel] == u16::from(label));
+        // What is hidden by a sheet further in front does not matter.
+        if seen.is_some_and(|seen| seen < sheet) {
+            return None;
+        }
+        let inside = seen == Some(sheet);
+        let look = Look { gbuffer, grid, front: &list[..sheet], label: list[sheet], reach: reach as usize };
+        let distances = look.around(pixel, inside);
+        match thin[usize::from(list[sheet])] {
+            Thin::No => Some(signed(distances, inside, reach)),
+            Thin::Across => strip(distances[0], distances[1], inside, reach),
+            Thin::Down => strip(distances[2], distances[3], inside, reach),
+        }
+    };
+    let fitted = fit::solve_for(&Problem { grid, sheets, layers, time: TIME_LINEAR, target });
+    let stored = |distance: f32| field_distance(field_code(libm::roundf(distance * 256.0) as i32)) as f32 / 256.0;
+    Fields { uv: fitted.uv.iter().map(|pair| pair.map(stored)).collect(), strip: thin.iter().map(|&thin| thin != Thin::No).collect() }
+}
+
+/// The target and weight of one field: the distance from the outline, from those along the two axes.
+fn signed([left, right, up, down]: Distances, inside: bool, reach: f32) -> ([f32; 2], f32) {
+    let nearest = |a: Option<f32>, b: Option<f32>| match (a, b) {
+        (Some(a), Some(b)) => Some(a.min(b)),
+        (one, other) => one.or(other),
+    };
+    // A straight outline d away cuts the axes at d / cos and d / sin.
+    let distance = match (nearest(left, right), nearest(up, down)) {
+        (Some(x), Some(y)) => x * y / (x * x + y * y).sqrt(),
+        (one, other) => one.or(other).unwrap_or(reach),
+    };
+    let weight = 1.0 / (1.0 + (distance / FALLOFF) * (distance / FALLOFF));
+    ([if inside { distance } else { -distance }, 0.0], weight)
+}
+
+/// The targets and weight of a strip's two fields, which go on linearly outside.
+fn strip(before: Option<f32>, after: Option<f32>, inside: bool, reach: f32) -> Option<([f32; 2], f32)> {
+    let pair = if inside {
+        [before.unwrap_or(reach), after.unwrap_or(reach)]
+    } else {
+        // Outside, what is near is an edge of the strip: the one that faces the pixel.
+        match (before, after) {
+            (Some(before), after) if after.is_none_or(|after| before <= after) => [reach, -before],
+            (_, Some(after)) => [-after, reach],
+            _ => return None,
+        }
+    };
+    let nearest = pair[0].abs().min(pair[1].abs());
+    Some((pair, 1.0 / (1.0 + (nearest / FALLOFF) * (nearest / FALLOFF))))
+}
+
+/// Looks from a pixel along its row and column.
+struct Look<'a> {
+    gbuffer: &'a GBuffer,
+    grid: &'a KeyGrid,
+    /// Labels that hide the sheet.
+    front: &'a [u8],
+    label: u8,
+    reach: usize,
+}
+
+impl Look<'_> {
+    /// The distances at which the sheet ends (`inside`) or begins, left, right, up and down.
+    fn around(&self, pixel: usize, inside: bool) -> Distances {
+        let [width, height] = self.grid.size;
+        let (x, y) = (pixel % width, pixel / width % height);
+        let along = |step: isize, room: usize| {
+            for distance in 1..=room.min(self.reach) {
+                let label = self.gbuffer.label[pixel.wrapping_add_signed(step * distance as isize)];
+                let own = label == u16::from(self.label);
+                if own != inside && (own || !self.front.iter().any(|&front| u16::from(front) == label)) {
+                    // The outline runs between the two pixel centres.
+                    return Some(distance as f32 - 0.5);
+                }
+            }
+            None
+        };
+        let row = width as isize;
+        [along(-1, x), along(1, width - 1 - x), along(-row, y), along(row, height - 1 - y)]
+    }
+}
+
+/// Whether a label's runs of pixels are shorter than a cell, and along which axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Thin {
+    No,
+    Across,
+    Down,
+}
+
+/// Finds the labels that are thinner than a cell in most of the torn cells they are seen in.
+fn thin_labels(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, labels: usize) -> Vec<Thin> {
+    let size = 1usize << grid.grid.log2;
+    let cells = grid.grid.cells();
+    // Per label: torn cells it is seen in, those it crosses whole within a row, within a column.
+    let counts: Vec<[u32; 3]> = (0..sheets.lists.len())
+        .into_par_iter()
+        .filter(|&index| sheets.lists[index].len() > 1)
+        .fold(
+            || vec![[0u32; 3]; labels],
+            |mut counts, index| {
+                let (interval, cell) = (index / cells, index % cells);
+                let frames = grid.frames_of(interval);
+                let frame = frames.start + (frames.end - frames.start) / 2;
+                let look = |label| Look { gbuffer, grid, front: &[], label, reach: 2 * size };
+                let mut longest: Vec<(u8, usize, [f32; 2])> = Vec::new();
+                grid.each_pixel(frame, cell, |pixel, _| {
+                    let label = gbuffer.label[pixel] as u8;
+                    let [left, right, up, down] = look(label).around(pixel, true);
+                    let run = |a: Option<f32>, b: Option<f32>| a.zip(b).map_or(f32::INFINITY, |(a, b)| a + b);
+                    let runs = [run(left, right), run(up, down)];
+                    match longest.iter_mut().find(|(l, ..)| *l == label) {
+                        Some((_, n, sum)) => {
+                            *n += 1;
+                            *sum = [sum[0].max(runs[0]), sum[1].max(runs[1])];
+                        }
+                        None => longest.push((label, 1, runs)),
+                    }
+                });
+                for (label, _, runs) in longest {
+                    let count = &mut counts[usize::from(label)];
+                    count[0] += 1;
+                    count[1] += u32::from(runs[0] < size as f32);
+                    count[2] += u32::from(runs[1] < size as f32);
+                }
+                counts
+            },
+        )
+        .reduce(
+            || vec![[0; 3]; labels],
+            |mut a, b| {
+                for (a, b) in a.iter_mut().zip(b) {
+                    *a = [a[0] + b[0], a[1] + b[1], a[2] + b[2]];
+                }
+                a
+            },
+        );
+    let kind = |[all, across, down]: [u32; 3]| {
+        if across.max(down) * 2 <= all {
+            Thin::No
+        } else if across >= down {
+            Thin::Across
+        } else {
+            Thin::Down
+        }
+    };
+    counts.into_iter().map(kind).collect()
+}

@@ -1,0 +1,80 @@
+//! Figures: how good a bundle's playback is, and what it costs.
+//! A bundle and the G-buffer it was made from come in; numbers go to the tables and to tests.
+
+use crate::play;
+use anyhow::Result;
+use cubist_baker::atlas::Atlas;
+use cubist_core::Player;
+use std::time::Instant;
+
+/// A bundle played against exact ray casting of every pixel through the same source image.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Quality {
+    /// Mean over the frames of their PSNR, dB; a frame without error counts as 99.
+    pub psnr_mean: f64,
+    /// PSNR of the worst frame.
+    pub psnr_min: f64,
+    /// Pixels that show another label than the ray sees, percent.
+    pub wrong_surface_percent: f64,
+    /// Pixels in cells of more than one sheet, percent.
+    pub torn_percent: f64,
+}
+
+/// Eight bits a component from RGB565, as displays widen them: the leading bits repeated.
+#[must_use]
+pub fn widen(colour: u16) -> [u8; 3] {
+    let [r, g, b] = [colour >> 11, colour >> 5 & 0x3f, colour & 0x1f];
+    [(r << 3 | r >> 2) as u8, (g << 2 | g >> 4) as u8, (b << 3 | b >> 2) as u8]
+}
+
+/// Compares all frames of a bundle with the G-buffer of `atlas`.
+///
+/// # Errors
+/// The bundle does not parse.
+pub fn quality(bytes: &[u8], atlas: &Atlas) -> Result<Quality> {
+    let (image, gbuffer) = (&atlas.image, &atlas.gbuffer);
+    let size = (gbuffer.width * gbuffer.height) as usize;
+    let (mut sum, mut least, mut wrong, mut torn) = (0.0f64, f64::INFINITY, 0u64, 0u64);
+    play::visit(bytes, 0..gbuffer.frames, |frame, player| {
+        let exact = frame as usize * size..(frame as usize + 1) * size;
+        let mut squares = 0u64;
+        for (pixel, uv) in play::pixels(player).into_iter().zip(&gbuffer.uv[exact.clone()]) {
+            let texel = image.texels[uv[1] as usize * image.width as usize + uv[0] as usize];
+            let pairs = widen(pixel).into_iter().zip(image.palette[usize::from(texel)]);
+            squares += pairs.map(|(a, b)| u64::from(a.abs_diff(b)).pow(2)).sum::<u64>();
+        }
+        let psnr = psnr(squares, 3 * size);
+        (sum, least) = (sum + psnr, least.min(psnr));
+        torn += u64::from(player.work().torn_pixels);
+        let labels = play::probes(player).into_iter().zip(&gbuffer.label[exact]);
+        wrong += labels.filter(|(probe, label)| u16::from(probe.label) != **label).count() as u64;
+    })?;
+    let percent = |count: u64| 100.0 * count as f64 / gbuffer.label.len() as f64;
+    Ok(Quality {
+        psnr_mean: sum / f64::from(gbuffer.frames),
+        psnr_min: least,
+        wrong_surface_percent: percent(wrong),
+        torn_percent: percent(torn),
+    })
+}
+
+/// PSNR of `values` components of eight bits whose squared errors sum to `squares`, dB; at most 99.
+#[must_use]
+pub fn psnr(squares: u64, values: usize) -> f64 {
+    if squares == 0 { 99.0 } else { (10.0 * (255.0 * 255.0 * values as f64 / squares as f64).log10()).min(99.0) }
+}
+
+/// Frames a second of the host playing every frame once, in order.
+///
+/// # Errors
+/// The bundle does not parse.
+pub fn speed(bytes: &[u8], frames: u32) -> Result<f64> {
+    let mut row = vec![0u16; 4096];
+    let start = Instant::now();
+    play::visit(bytes, 0..frames, |_, player: &mut Player<'_>| {
+        for y in 0..player.bundle().size().1 {
+            player.row(y, &mut row);
+        }
+    })?;
+    Ok(f64::from(frames) / start.elapsed().as_secs_f64().max(1e-9))
+}

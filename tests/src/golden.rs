@@ -1,0 +1,42 @@
+//! Goldens: checksums of every built-in scene's bundle and of some of its frames.
+//! Scenes come from `scenes`; the checksums stand in `fixtures/golden`, one file a scene, written by the command `goldens`
+//! and compared by the test of the same name.
+
+use crate::{play, scenes};
+use anyhow::Result;
+use cubist_baker::bake::Settings;
+use cubist_core::checksum;
+use serde_json::{Map, Value, json};
+use std::path::PathBuf;
+
+/// The command that makes the files anew.
+pub const COMMAND: &str = "cargo run --release -p cubist-tests --bin goldens";
+
+/// The frames whose pixels are checked: both ends, keys, and moments between them.
+pub const SHOWN: [u32; 8] = [0, 3, 8, 13, 16, 22, 27, 31];
+
+/// The file of scene `name`.
+#[must_use]
+pub fn file(name: &str) -> PathBuf {
+    [env!("CARGO_MANIFEST_DIR"), "..", "fixtures", "golden", &format!("{name}.json")].iter().collect()
+}
+
+/// Bakes and plays scene `name` at the reduced setting: length and CRC-32 of the bundle, CRC-32 of the pixels of
+/// [`SHOWN`] (RGB565, little-endian, row by row).
+///
+/// # Errors
+/// Those of the baker.
+pub fn make(name: &str) -> Result<Value> {
+    let bytes = scenes::bundle(name, scenes::SIZE, scenes::FRAMES, &Settings::default())?;
+    let mut frames = Map::new();
+    play::visit(&bytes, SHOWN, |frame, player| {
+        let pixels: Vec<u8> = play::pixels(player).into_iter().flat_map(u16::to_le_bytes).collect();
+        frames.insert(format!("{frame:04}"), hex(&pixels));
+    })?;
+    let bundle = json!({ "bytes": bytes.len(), "crc32": hex(&bytes) });
+    Ok(json!({ "scene": name, "size": scenes::SIZE, "frames": scenes::FRAMES, "bundle": bundle, "frame_crc32": frames }))
+}
+
+fn hex(bytes: &[u8]) -> Value {
+    Value::String(format!("{:08x}", checksum(bytes)))
+}

@@ -1,0 +1,51 @@
+//! Plays bundles through the core's player, whole frames at a time.
+//! Bundles come from `scenes`; pixels and probes go to the tests and to `figures`.
+
+use anyhow::Result;
+use cubist_core::{Bundle, Frame, Player, Probe};
+
+/// Calls `visit` with every frame number of `frames` and the player that stands at it.
+///
+/// # Errors
+/// The bundle does not parse.
+pub fn visit(bytes: &[u8], frames: impl IntoIterator<Item = u32>, mut visit: impl FnMut(u32, &mut Player<'_>)) -> Result<()> {
+    let bundle = Bundle::parse(bytes)?;
+    let mut memory = vec![0; bundle.memory_needed()];
+    let mut player = Player::new(&bundle, &mut memory)?;
+    for frame in frames {
+        player.seek(Frame(frame));
+        visit(frame, &mut player);
+    }
+    Ok(())
+}
+
+/// The current frame of `player`: RGB565, row by row.
+#[must_use]
+pub fn pixels(player: &mut Player<'_>) -> Vec<u16> {
+    whole(player, |player, y, out| player.row(y, out))
+}
+
+/// Where each pixel of the current frame of `player` comes from, row by row.
+#[must_use]
+pub fn probes(player: &mut Player<'_>) -> Vec<Probe> {
+    whole(player, |player, y, out| player.probe_row(y, out))
+}
+
+fn whole<T: Clone + Default>(player: &mut Player<'_>, row: impl Fn(&mut Player<'_>, u32, &mut [T])) -> Vec<T> {
+    let (width, height) = player.bundle().size();
+    let mut picture = vec![T::default(); (width * height) as usize];
+    for (y, out) in (0..).zip(picture.chunks_mut(width as usize)) {
+        row(player, y, out);
+    }
+    picture
+}
+
+/// The pixels of `frames`, in that order.
+///
+/// # Errors
+/// The bundle does not parse.
+pub fn frames(bytes: &[u8], frames: impl IntoIterator<Item = u32>) -> Result<Vec<Vec<u16>>> {
+    let mut pictures = Vec::new();
+    visit(bytes, frames, |_, player| pictures.push(pixels(player)))?;
+    Ok(pictures)
+}

@@ -1,0 +1,301 @@
+//! The reference player: what the integer player means, in plain f64.
+//! Keys are decoded with the core's own description of the stream; everything after that (time, space, coverage, texel) is
+//! said again here, in the simplest way that can be checked by reading. Pictures go to the differential tests.
+
+use cubist_core::Bundle;
+use cubist_core::coder::{Decoder, Probability};
+use cubist_core::fixed::ONE;
+use cubist_core::format::{MASK, MASKED, TIME_CUBIC, TIME_HOLD};
+use cubist_core::grid::Grid;
+use cubist_core::key::{self, Key, Nothing, Trace};
+use cubist_core::lists::{self, Lists};
+use cubist_core::record::{LISTS, MAX_KEYS, Shape, Stream};
+use cubist_core::timeline;
+
+/// How near the edge of the source image a node's position may come, texels (FORMAT.md: 32 / 65536).
+const EDGE: f64 = 32.0 / 65_536.0;
+
+/// What the keys around a frame weigh.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Weights {
+    /// Exactly what they should.
+    Exact,
+    /// What the player's integers make of it: what is left then is the rounding of positions.
+    Player,
+}
+
+/// The weights of four keys: before an interval, at its two ends, after it.
+pub type Four = [f64; 4];
+
+/// The exact weights at `t` (0..=1) of an interval of `lengths[1]` frames between intervals of `lengths[0]` and `lengths[2]`, where
+/// `missing` tells which of the outer keys carry no layer: a cubic Hermite curve through the inner two, with the secants over two
+/// intervals as tangents; with the interval's own secant where a key is missing.
+#[must_use]
+pub fn weights(time: u8, lengths: [u32; 3], t: f64, missing: [bool; 2]) -> Four {
+    match time {
+        // An interval of no frames is that of a path of one frame.
+        _ if lengths[1] == 0 => return [0.0, 1.0, 0.0, 0.0],
+        TIME_HOLD => return [0.0, 1.0, 0.0, 0.0],
+        TIME_CUBIC => {}
+        _ => return [0.0, 1.0 - t, t, 0.0],
+    }
+    let [before, length, after] = lengths.map(f64::from);
+    let (leaving, arriving) = (t * (1.0 - t) * (1.0 - t), t * t * (t - 1.0));
+    let value = t * t * (3.0 - 2.0 * t);
+    let mut weights = [0.0, 1.0 - value, value, 0.0];
+    let mut tangent = |amount: f64, from: usize, to: usize, frames: f64| {
+        weights[from] -= amount * length / frames;
+        weights[to] += amount * length / frames;
+    };
+    if missing[0] {
+        tangent(leaving, 1, 2, length)
+    } else {
+        tangent(leaving, 0, 2, before + length)
+    };
+    if missing[1] {
+        tangent(arriving, 1, 2, length)
+    } else {
+        tangent(arriving, 1, 3, length + after)
+    };
+    weights
+}
+
+/// A layer of a node: a label and its position in the source image, texels.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Layer {
+    label: u8,
+    at: [f64; 2],
+}
+
+/// One pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pixel {
+    /// The label of the sheet that shows.
+    pub label: u8,
+    /// Its position in the source image, texels.
+    pub at: [f64; 2],
+    /// RGB565.
+    pub colour: u16,
+    /// How far apart the keys of any corner that was looked at are, texels.
+    pub motion: f64,
+    /// How near any position that was looked at is to an edge between texels, texels: rounding can only change the pixel
+    /// where this is small.
+    pub margin: f64,
+}
+
+/// All keys of a bundle, decoded.
+pub struct Reference<'a> {
+    bundle: &'a Bundle<'a>,
+    grid: Grid,
+    /// For every key the nodes' layers.
+    keys: Vec<Vec<Vec<Layer>>>,
+    /// For every interval the cells' labels, front to back.
+    lists: Vec<Vec<Vec<u8>>>,
+    mask: &'a [u8],
+}
+
+impl<'a> Reference<'a> {
+    /// Decodes all keys of `bundle`, from the first on.
+    #[must_use]
+    pub fn new(bundle: &'a Bundle<'a>) -> Self {
+        let (path, limits) = (bundle.path(), bundle.limits());
+        let grid = Grid::new(path.width, path.height, path.cell_log2);
+        let layers = usize::from(limits.key_layers);
+        let mut contexts = [vec![Probability::NEW; lists::CONTEXTS], vec![Probability::NEW; key::CONTEXTS]];
+        let mut traces = vec![Trace::default(); 2 * usize::from(limits.row_layers)];
+        let mut key_memory: [_; MAX_KEYS] = std::array::from_fn(|_| (vec![0; grid.nodes() + 1], vec![0; layers], vec![0; layers]));
+        let mut list_memory: [_; LISTS] = std::array::from_fn(|_| (vec![0; grid.rows + 1], vec![0; usize::from(limits.list_bytes)]));
+        let [list_contexts, key_contexts] = &mut contexts;
+        let mut stream = Stream {
+            list_contexts,
+            key_contexts,
+            traces: &mut traces,
+            keys: key_memory.each_mut().map(|(start, label, uv)| Key { start, label, uv }),
+            lists: list_memory.each_mut().map(|(rows, data)| Lists::new(rows, data)),
+            slots: MAX_KEYS,
+            turn: 0,
+        };
+        let shape = Shape { grid, labels: bundle.label_count(), label: |label| bundle.label(label), step_log2: u32::from(path.step_log2) };
+        let mask = bundle.sections().find(|section| section.tag == MASK).map_or(&[][..], |section| section.bytes);
+        let mut reference = Self { bundle, grid, keys: Vec::new(), lists: Vec::new(), mask };
+        let mut run = 0;
+        for key in 0..bundle.key_count() {
+            run = if bundle.key(key).independent { 0 } else { run + 1 };
+            stream.code(&mut Decoder::new(bundle.record(key)), shape, bundle.place(key, run), &mut Nothing);
+            reference.keys.extend(stream.key(0).map(|key| nodes(key, grid)));
+            reference.lists.extend(stream.lists(0).map(|lists| cells(lists, grid)));
+        }
+        reference
+    }
+
+    /// What shows `frame`: the interval's four keys, where there are such, and their weights.
+    fn moment(&self, frame: u32, kind: Weights) -> Moment {
+        let count = self.bundle.key_count();
+        let looping = self.bundle.looping();
+        let mut from = (0..count).rev().find(|&key| self.bundle.key(key).frame <= frame).unwrap_or(0);
+        if !looping && from > 0 && from + 1 == count {
+            // The last key of a path that ends is the end of its last interval.
+            from -= 1;
+        }
+        let frame_of = |key: usize| self.bundle.key(key).frame;
+        let length = |back: isize| {
+            let start = from as isize + back;
+            let start = if looping { start.rem_euclid(count as isize) } else { start };
+            match usize::try_from(start) {
+                Ok(start) if start + 1 < count => frame_of(start + 1) - frame_of(start),
+                Ok(start) if looping => self.bundle.frames() - frame_of(start),
+                _ => 0,
+            }
+        };
+        let key = |ahead: isize| {
+            let key = from as isize + ahead;
+            let key = if looping { key.rem_euclid(count as isize) } else { key };
+            usize::try_from(key).ok().filter(|&key| key < count)
+        };
+        let (time, lengths, passed) = (self.bundle.path().time, [-1, 0, 1].map(length), frame - frame_of(from));
+        let outer = |ahead| if time == TIME_CUBIC { key(ahead) } else { None };
+        // The only key of a path that ends is both ends of its only interval.
+        let keys = [outer(-1), Some(from), key(1).or(Some(from)), outer(2)];
+        let weights = |missing: [bool; 2]| match kind {
+            Weights::Exact => weights(time, lengths, f64::from(passed) / f64::from(lengths[1]), missing),
+            Weights::Player => {
+                let set = usize::from(missing[0]) + 2 * usize::from(missing[1]);
+                timeline::weights(time, lengths, passed)[set].map(|weight| f64::from(weight) / f64::from(ONE))
+            }
+        };
+        Moment { keys, weights: [[false, false], [true, false], [false, true], [true, true]].map(weights), interval: from }
+    }
+
+    /// Renders `frame`, row by row; `None` at pixels that no sheet shows at, of which a sound bundle has none.
+    #[must_use]
+    pub fn frame(&self, frame: u32, weights: Weights) -> Vec<Option<Pixel>> {
+        let moment = self.moment(frame, weights);
+        let (width, height) = self.bundle.size();
+        let size = 1u32 << self.grid.log2;
+        let mut picture = Vec::new();
+        for y in 0..height {
+            for x in 0..width {
+                let (column, row) = ((x / size) as usize, (y / size) as usize);
+                let sheets = self.sheets(&moment, column, row);
+                let within = [x % size, y % size].map(|offset| f64::from(offset) / f64::from(size));
+                picture.push(self.pixel(&sheets, within));
+            }
+        }
+        picture
+    }
+
+    /// The sheets of a cell, front to back, with their four corners at one moment.
+    fn sheets(&self, moment: &Moment, column: usize, row: usize) -> Vec<Sheet> {
+        let nodes = self.grid.columns + 1;
+        let corner = row * nodes + column;
+        let corners = [corner, corner + 1, corner + nodes, corner + nodes + 1];
+        let labels = &self.lists[moment.interval][row * self.grid.columns + column];
+        labels.iter().filter_map(|&label| self.sheet(moment, corners, label)).collect()
+    }
+
+    /// The sheet of `label` between nodes; `None` where one carries no such layer.
+    fn sheet(&self, moment: &Moment, nodes: [usize; 4], label: u8) -> Option<Sheet> {
+        let limit = [1u32 << self.bundle.atlas().width_log2, u32::from(self.bundle.atlas().height)].map(f64::from);
+        let mut sheet = Sheet { label, corners: [[0.0; 2]; 4], motion: 0.0 };
+        for (node, place) in nodes.into_iter().zip(&mut sheet.corners) {
+            let layers = moment.keys.map(|key| self.keys[key?][node].iter().find(|layer| layer.label == label).map(|layer| layer.at));
+            let start = layers[1]?;
+            layers[2]?;
+            let weights = moment.weights[usize::from(layers[0].is_none()) + 2 * usize::from(layers[3].is_none())];
+            for axis in 0..2 {
+                let values = layers.map(|layer| layer.map_or(0.0, |at| at[axis]));
+                let now: f64 = values.iter().zip(weights).map(|(value, weight)| value * weight).sum();
+                place[axis] = now.clamp(EDGE, limit[axis] - EDGE);
+                let apart = layers.iter().flatten().map(|at| (at[axis] - start[axis]).abs());
+                sheet.motion = apart.fold(sheet.motion, f64::max);
+            }
+        }
+        Some(sheet)
+    }
+
+    /// The first sheet whose chart covers the place `within` the cell; the last one needs no chart.
+    fn pixel(&self, sheets: &[Sheet], within: [f64; 2]) -> Option<Pixel> {
+        let (mut motion, mut margin) = (0.0f64, f64::INFINITY);
+        for (index, sheet) in sheets.iter().enumerate() {
+            let at = sheet.position(within);
+            motion = motion.max(sheet.motion);
+            margin = at.iter().map(|x| (x - x.round()).abs()).fold(margin, f64::min);
+            if index + 1 == sheets.len() || self.covers(sheet.label, at) {
+                return Some(Pixel { label: sheet.label, at, colour: self.colour(at), motion, margin });
+            }
+        }
+        None
+    }
+
+    /// Whether the chart of `label` covers `at`: inside the rectangle and, where the label has a mask, on a texel of the chart.
+    fn covers(&self, label: u8, [u, v]: [f64; 2]) -> bool {
+        let record = self.bundle.label(label);
+        let inside =
+            u >= f64::from(record.left) && u < f64::from(record.right) && v >= f64::from(record.top) && v < f64::from(record.bottom);
+        let index = self.texel([u, v]);
+        inside && (record.flags & MASKED == 0 || self.mask[index / 8] & 1 << (index % 8) != 0)
+    }
+
+    fn colour(&self, at: [f64; 2]) -> u16 {
+        let atlas = self.bundle.atlas();
+        let entry = 2 * usize::from(atlas.texels[self.texel(at)]);
+        u16::from_le_bytes([atlas.palette[entry], atlas.palette[entry + 1]])
+    }
+
+    /// The index of the texel that holds a position.
+    fn texel(&self, [u, v]: [f64; 2]) -> usize {
+        v.floor() as usize * (1 << self.bundle.atlas().width_log2) + u.floor() as usize
+    }
+}
+
+/// What shows a frame.
+struct Moment {
+    interval: usize,
+    /// Before the interval, at its two ends, after it.
+    keys: [Option<usize>; 4],
+    /// By which of the outer two carry no layer: neither, the first, the last, both.
+    weights: [Four; 4],
+}
+
+/// A sheet of a cell at one moment: corners top left, top right, bottom left, bottom right.
+struct Sheet {
+    label: u8,
+    corners: [[f64; 2]; 4],
+    motion: f64,
+}
+
+impl Sheet {
+    /// Bilinear over the cell.
+    fn position(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let [a, b, c, d] = self.corners;
+        [0, 1].map(|axis: usize| {
+            let left = a[axis] + (c[axis] - a[axis]) * y;
+            let right = b[axis] + (d[axis] - b[axis]) * y;
+            left + (right - left) * x
+        })
+    }
+}
+
+/// The layers of every node of a key.
+fn nodes(key: &Key<'_>, grid: Grid) -> Vec<Vec<Layer>> {
+    (0..grid.nodes())
+        .map(|node| {
+            let (first, labels) = key.node(node);
+            let at = |index: usize| [key.uv(index).u(), key.uv(index).v()].map(|x| f64::from(x) / 64.0);
+            (first..).zip(labels).map(|(index, &label)| Layer { label, at: at(index) }).collect()
+        })
+        .collect()
+}
+
+/// The labels of every cell of an interval, front to back.
+fn cells(lists: &Lists<'_>, grid: Grid) -> Vec<Vec<u8>> {
+    let mut cells = Vec::new();
+    for row in 0..grid.rows {
+        let mut cursor = lists.row(row);
+        for _ in 0..grid.columns {
+            cells.push(lists.sheets(cursor).to_vec());
+            cursor = cursor.next(lists);
+        }
+    }
+    cells
+}

@@ -1,0 +1,41 @@
+//! Scenes for the tests: the built-in ones, made small enough to bake in a moment.
+//! They come from `cubist_baker::scene::builtin`; bundles go to every test.
+
+use anyhow::{Context, Result};
+use cubist_baker::bake::{self, Encoded, Flat, Settings};
+use cubist_baker::scene::{Scene, builtin};
+
+/// The screen of the reduced setting, pixels.
+pub const SIZE: [u32; 2] = [160, 120];
+/// The frames of the reduced setting.
+pub const FRAMES: u32 = 32;
+
+/// The built-in scene `name` on a screen of `size` pixels, its whole camera path in `frames` frames.
+///
+/// # Errors
+/// There is no scene of that name.
+pub fn reduced(name: &str, size: [u32; 2], frames: u32) -> Result<Scene> {
+    let names = builtin::NAMES.join(", ");
+    let mut scene = builtin::build(name).with_context(|| format!("no built-in scene \"{name}\"; there are {names}"))?;
+    (scene.playback.width, scene.playback.height, scene.playback.frames) = (size[0], size[1], frames);
+    Ok(scene)
+}
+
+/// Bakes `scene` in silence; gives the bundle and what it was made from.
+///
+/// # Errors
+/// Those of the baker, with the scene's name.
+pub fn bake(scene: &Scene, settings: &Settings) -> Result<(Flat, Encoded)> {
+    let name = || format!("bake {}", scene.name);
+    let flat = bake::flatten(scene, &settings.atlas, &|_, _| {}).with_context(name)?;
+    let encoded = bake::encode(scene, &flat, settings, &|_, _| {}).with_context(name)?;
+    Ok((flat, encoded))
+}
+
+/// The bytes of the bundle of the built-in scene `name` at `size` and `frames`.
+///
+/// # Errors
+/// Those of [`reduced`] and [`bake`].
+pub fn bundle(name: &str, size: [u32; 2], frames: u32, settings: &Settings) -> Result<Vec<u8>> {
+    Ok(bake(&reduced(name, size, frames)?, settings)?.1.bundle)
+}

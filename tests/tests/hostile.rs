@@ -1,0 +1,309 @@
+//! Hostile bundles: whatever the bytes, parsing refuses them or the player plays something: no panic, every pixel written, the
+//! same pixels whatever the memory held. First layer: cuts, changed bytes, changed fields; what a fuzzer finds comes on top.
+
+use cubist_baker::bake::Settings;
+use cubist_core::format::{ATLAS, Atlas, Envelope, KeyEntry, LABEL_BYTES, LABELS, LabelRecord, Limits, PATH, Path, Section};
+use cubist_core::{Bundle, BundleError, Frame, MemoryError, Player, checksum};
+use cubist_tests::scenes;
+use proptest::prelude::*;
+use std::sync::OnceLock;
+
+/// A small bundle with several labels, a mask, torn cells and dependent keys.
+fn sound() -> &'static [u8] {
+    static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
+    BYTES.get_or_init(|| {
+        let mut settings = Settings { cell: 8, key_interval: 2, ..Settings::default() };
+        settings.atlas.max_side = 64;
+        let bytes = scenes::bundle("street", [52, 39], 9, &settings).expect("a built-in scene bakes");
+        let copy = bytes.clone();
+        let bundle = Bundle::parse(&copy).expect("the baker's bytes parse");
+        assert!(bundle.sections().any(|section| section.tag == *b"MASK"), "a mask belongs to the test");
+        assert!(bundle.limits().cell_sheets > 1, "torn cells belong to the test");
+        println!("{} bytes, {:?}, {} labels, {} keys", bytes.len(), bundle.limits(), bundle.label_count(), bundle.key_count());
+        assert!((0..bundle.key_count()).any(|key| !bundle.key(key).independent), "dependent keys belong to the test");
+        bytes
+    })
+}
+
+/// Puts the checksum right.
+fn seal(bytes: &mut [u8]) {
+    if let Some(body) = bytes.len().checked_sub(4) {
+        let sum = checksum(&bytes[..body]).to_le_bytes();
+        bytes[body..].copy_from_slice(&sum);
+    }
+}
+
+/// Plays three frames if `bytes` parse, from memory filled with `fill`: at most 12 rows of each. `None`: refused.
+fn play(bytes: &[u8], fill: u8) -> Option<Vec<u16>> {
+    let bundle = Bundle::parse(bytes).ok()?;
+    let (width, height) = bundle.size();
+    let mut memory = vec![fill; bundle.memory_needed()];
+    let mut player = Player::new(&bundle, &mut memory).expect("the memory it asked for");
+    let mut pixels = Vec::new();
+    for frame in [0, bundle.frames() / 2, bundle.frames() - 1] {
+        player.seek(Frame(frame));
+        for y in (0..height).step_by(height.div_ceil(12) as usize) {
+            // Two fills: a pixel that is not written keeps both.
+            let mut row = vec![0xdead; width as usize];
+            player.row(y, &mut row);
+            let mut again = vec![0xbeef; width as usize];
+            player.row(y, &mut again);
+            assert!(row == again, "frame {frame}, row {y}: a pixel is left out");
+            pixels.extend(row);
+        }
+        assert!(player.work().keys <= u32::from(bundle.limits().seek_keys), "frame {frame}: more keys decoded than the bundle says");
+    }
+    Some(pixels)
+}
+
+/// Whether `bytes` parse; if so they play, the same from any memory.
+fn survives(bytes: &[u8]) -> bool {
+    let pixels = play(bytes, 0);
+    assert!(pixels == play(bytes, 0xff), "pixels depend on what the memory held");
+    pixels.is_some()
+}
+
+/// `bytes` with `change` made to the envelope.
+fn enveloped<'a>(bytes: &'a [u8], change: impl FnOnce(&mut Envelope<'a>)) -> Vec<u8> {
+    let mut envelope: Envelope<'a> = postcard::take_from_bytes(bytes).expect("a sound envelope").0;
+    change(&mut envelope);
+    let mut bytes = postcard::to_stdvec(&envelope).expect("an envelope serialises");
+    bytes.extend([0; 4]);
+    seal(&mut bytes);
+    bytes
+}
+
+/// `bytes` with the section `tag` replaced.
+fn with_section<'a>(bytes: &'a [u8], tag: [u8; 4], section: &'a [u8]) -> Vec<u8> {
+    enveloped(bytes, |envelope| {
+        envelope.sections.iter_mut().find(|s| s.tag == tag).expect("the section is there").bytes = section;
+    })
+}
+
+fn section(tag: [u8; 4]) -> &'static [u8] {
+    Bundle::parse(sound()).expect("sound").sections().find(|s| s.tag == tag).expect("the section is there").bytes
+}
+
+/// The sound bundle with `change` made to its camera path.
+fn with_path<'a>(change: impl FnOnce(&mut Path<'a>)) -> Vec<u8> {
+    let mut path: Path<'a> = postcard::from_bytes(section(PATH)).expect("a sound path");
+    change(&mut path);
+    with_section(sound(), PATH, &postcard::to_stdvec(&path).expect("a path serialises"))
+}
+
+fn with_limits(change: impl FnOnce(&mut Limits)) -> Vec<u8> {
+    with_path(|path| change(&mut path.limits))
+}
+
+#[test]
+fn the_sound_bundle_plays() {
+    assert!(survives(sound()));
+    assert_eq!(enveloped(sound(), |_| {}), sound(), "the bytes have one form only");
+}
+
+#[test]
+fn every_cut_is_refused() {
+    for length in 0..sound().len() {
+        let mut cut = sound()[..length].to_vec();
+        assert!(Bundle::parse(&cut).is_err(), "{length} bytes parse");
+        seal(&mut cut);
+        assert!(Bundle::parse(&cut).is_err(), "{length} bytes parse with a checksum of their own");
+    }
+}
+
+#[test]
+fn every_changed_byte_is_refused_by_the_checksum() {
+    let mut bytes = sound().to_vec();
+    for at in 0..bytes.len() {
+        for flip in [0x01, 0x80, 0xff] {
+            bytes[at] ^= flip;
+            assert!(Bundle::parse(&bytes).is_err(), "byte {at} changed by {flip:#x}");
+            bytes[at] ^= flip;
+        }
+    }
+}
+
+/// A small generator (splitmix64): the same changes in every run.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, end: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut x = self.0;
+        x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((x ^ x >> 31) % end as u64) as usize
+    }
+}
+
+/// Changes one to eight bytes of `bytes` within `range`.
+fn mutate(bytes: &mut [u8], range: std::ops::Range<usize>, random: &mut Random) {
+    let values = [0, 1, 0x7f, 0x80, 0xff];
+    for _ in 0..1 + random.below(8) * random.below(2) {
+        let at = range.start + random.below(range.len());
+        bytes[at] = match random.below(4) {
+            0 => bytes[at] ^ 1 << random.below(8),
+            1 => values[random.below(values.len())],
+            2 => bytes[at].wrapping_add(if random.below(2) == 0 { 1 } else { 255 }),
+            _ => random.below(256) as u8,
+        };
+    }
+}
+
+/// Where the section `tag` lies in the sound bundle.
+fn range(tag: [u8; 4]) -> std::ops::Range<usize> {
+    let start = section(tag).as_ptr().addr() - sound().as_ptr().addr();
+    start..start + section(tag).len()
+}
+
+#[test]
+fn changed_bytes_with_a_matching_checksum_never_panic() {
+    let mut random = Random(1);
+    let texels = range(ATLAS);
+    let mut played = 0;
+    for round in 0..20_000 {
+        let mut bytes = sound().to_vec();
+        let everywhere = 0..bytes.len() - 4;
+        // Texels are the most bytes and the dullest: most changes go to headers, labels and keys.
+        let range = match round % 8 {
+            0 => everywhere,
+            1 => texels.start..texels.start + 16,
+            2 | 3 => range(LABELS),
+            4 => range(PATH).start..range(PATH).start + 60,
+            _ => range(PATH),
+        };
+        mutate(&mut bytes, range, &mut random);
+        seal(&mut bytes);
+        played += usize::from(survives(&bytes));
+    }
+    // If nearly all were refused, the test would say little about playing.
+    assert!((4_000..19_000).contains(&played), "{played} of 20000 played");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2_000, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn any_limits_and_sizes_play_or_are_refused(
+        size in (0u16..80, 0u16..80),
+        grid in (1u8..7, 0u8..3, 0u8..6),
+        limits in (any::<[u16; 5]>(), 0u8..14, 0u32..5),
+        frames in (0u32..20, any::<bool>()),
+    ) {
+        survives(&with_path(|path| {
+            let (values, cell_sheets, shift) = limits;
+            let [key_layers, row_layers, list_bytes, row_sheets, seek_keys] = values.map(|x| x >> (3 * shift));
+            (path.width, path.height) = size;
+            (path.cell_log2, path.time, path.step_log2) = grid;
+            (path.frames, path.looping) = frames;
+            path.limits = Limits { key_layers, row_layers, list_bytes, row_sheets, cell_sheets, seek_keys };
+        }));
+    }
+
+    #[test]
+    fn any_key_records_play(records in prop::collection::vec(any::<u8>(), 0..600), looping: bool) {
+        let third = records.len() as u32 / 3;
+        let key = |frame, independent, end| KeyEntry { frame, independent, end }.to_bytes();
+        let table = [key(0, true, third), key(3, false, 2 * third), key(8, true, records.len() as u32)].concat();
+        let bytes = with_path(|path| {
+            (path.looping, path.frames) = (looping, if looping { 11 } else { 9 });
+            (path.table, path.records) = (&table, &records);
+        });
+        prop_assert!(survives(&bytes));
+    }
+
+    #[test]
+    fn any_labels_play_or_are_refused(fields in prop::collection::vec(any::<[u8; LABEL_BYTES]>(), 1..9), tame: bool) {
+        let labels: Vec<u8> = fields.iter().flat_map(|bytes| {
+            let mut label = LabelRecord::from_bytes(bytes);
+            if tame {
+                (label.left, label.top, label.right, label.bottom) = (label.left % 30, label.top % 30, 30 + label.right % 30, 30 + label.bottom % 30);
+                label.flags %= 3;
+            }
+            label.to_bytes()
+        }).collect();
+        survives(&with_section(sound(), LABELS, &labels));
+    }
+}
+
+#[test]
+fn limits_that_are_too_low_leave_pixels_out_but_play() {
+    let halve = |x: &mut u16| *x /= 2;
+    let changes: [fn(&mut Limits); 6] = [
+        |limits| limits.key_layers /= 2,
+        |limits| limits.row_layers /= 2,
+        |limits| limits.list_bytes /= 2,
+        |limits| limits.row_sheets /= 2,
+        |limits| limits.cell_sheets = 1,
+        |limits| *limits = Limits { seek_keys: limits.seek_keys, cell_sheets: 1, ..Limits::default() },
+    ];
+    for change in changes {
+        assert!(survives(&with_limits(change)));
+    }
+    assert!(survives(&with_limits(|limits| [&mut limits.key_layers, &mut limits.row_layers].into_iter().for_each(halve))));
+    let refused = with_limits(|limits| limits.seek_keys = 1);
+    assert!(matches!(Bundle::parse(&refused), Err(BundleError::Field { name: "PATH seek_keys", found: 1 })));
+}
+
+#[test]
+fn the_palette_may_be_shorter_than_the_texels_ask_for() {
+    let mut atlas: Atlas<'_> = postcard::from_bytes(section(ATLAS)).expect("a sound image");
+    atlas.palette = &atlas.palette[..4];
+    assert!(survives(&with_section(sound(), ATLAS, &postcard::to_stdvec(&atlas).expect("it serialises"))));
+}
+
+#[test]
+fn a_byte_too_few_is_a_memory_error() {
+    let bundle = Bundle::parse(sound()).expect("sound");
+    let needed = bundle.memory_needed();
+    for given in [0, 1, needed / 2, needed - 1] {
+        let mut memory = vec![0; given];
+        let error = Player::new(&bundle, &mut memory).err();
+        assert_eq!(error, Some(MemoryError::TooSmall { needed, given }));
+    }
+    assert!(Player::new(&bundle, &mut vec![0; needed]).is_ok());
+}
+
+#[test]
+fn unknown_sections_are_skipped_unless_required() {
+    let add = |required| {
+        enveloped(sound(), |envelope| {
+            envelope.sections.insert(0, Section { tag: *b"NEWS", required, bytes: b"later versions" }).expect("room for a section");
+        })
+    };
+    let optional = add(false);
+    let (with, without) = (Bundle::parse(&optional).expect("skipped"), Bundle::parse(sound()).expect("sound"));
+    assert_eq!(with.sections().count(), without.sections().count() + 1);
+    assert!(play(&optional, 0) == play(sound(), 0));
+    let error = Bundle::parse(&add(true)).err();
+    assert_eq!(error, Some(BundleError::UnknownSection { tag: *b"NEWS" }));
+    assert!(error.expect("an error").to_string().contains("\"NEWS\""), "it is refused by name");
+}
+
+#[test]
+fn missing_sections_are_named() {
+    for tag in [PATH, ATLAS, LABELS] {
+        let bytes = enveloped(sound(), |envelope| envelope.sections.retain(|section| section.tag != tag));
+        assert_eq!(Bundle::parse(&bytes).err(), Some(BundleError::Section { tag }));
+    }
+    let bytes = enveloped(sound(), |envelope| envelope.sections.retain(|section| section.tag != *b"MASK"));
+    assert!(matches!(Bundle::parse(&bytes), Err(BundleError::Length { name: "MASK", found: 0, .. })));
+}
+
+#[test]
+fn sections_may_come_in_any_order() {
+    let bytes = enveloped(sound(), |envelope| envelope.sections.reverse());
+    assert!(bytes != sound() && play(&bytes, 0) == play(sound(), 0));
+}
+
+#[test]
+fn other_files_and_versions_are_told_apart() {
+    let version = enveloped(sound(), |envelope| envelope.version = 300);
+    assert_eq!(Bundle::parse(&version).err(), Some(BundleError::Version { expected: 1, found: 300 }));
+    let magic = enveloped(sound(), |envelope| envelope.magic = *b"CUBISM");
+    assert_eq!(Bundle::parse(&magic).err(), Some(BundleError::NotABundle));
+    assert_eq!(Bundle::parse(b"").err(), Some(BundleError::NotABundle));
+    assert_eq!(Bundle::parse(b"GIF89a..............................").err(), Some(BundleError::NotABundle));
+    let trailing = [sound(), &[0; 3]].concat();
+    assert_eq!(Bundle::parse(&trailing).err(), Some(BundleError::TrailingBytes { count: 3 }));
+}
