@@ -1,13 +1,14 @@
 //! The whole line: a scene in, a bundle out.
 //! The stages are the crate's modules; this runs them in order, times them, and reports progress.
 
-use crate::atlas::{self, Atlas, AtlasError};
+use crate::atlas::{self, Atlas, AtlasError, SourceImage};
 use crate::encode::{self, CodingSettings};
+use crate::folds::{self, Folded};
 use crate::gbuffer::Hits;
 use crate::scene::Scene;
 use crate::sheets::{self, KeyGrid, Layers};
 use crate::trace::Tracer;
-use crate::{fields, fit, order};
+use crate::{fields, fit, order, tears};
 use cubist_core::format::TIME_CUBIC;
 use std::time::Instant;
 use thiserror::Error;
@@ -78,6 +79,8 @@ impl Default for Settings {
 pub struct Flat {
     /// The source image and the G-buffer in it.
     pub atlas: Atlas,
+    /// Where the G-buffer's charts hide parts of themselves (see [`tears`]).
+    pub tears: Vec<u8>,
     /// Rays cast.
     pub rays: u64,
     /// Seconds the rays took.
@@ -111,7 +114,9 @@ pub fn flatten(scene: &Scene, settings: &atlas::Settings, progress: Progress<'_>
     let ray_seconds = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let atlas = atlas::build(scene, &hits, settings, &|done, total| progress("flattening surfaces", part(done, total)))?;
-    Ok(Flat { rays: hits.samples.len() as u64, atlas, ray_seconds, atlas_seconds: start.elapsed().as_secs_f64() })
+    progress("looking for tears", 0.0);
+    let tears = tears::find(scene, &tracer, &hits, &atlas.gbuffer);
+    Ok(Flat { tears, rays: hits.samples.len() as u64, atlas, ray_seconds, atlas_seconds: start.elapsed().as_secs_f64() })
 }
 
 /// Fits and codes the keys, and puts the bundle together.
@@ -129,6 +134,8 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let Atlas { image, gbuffer, .. } = &flat.atlas;
     let grid = KeyGrid::new(gbuffer, settings.cell.trailing_zeros() as u8, settings.key_interval, scene.playback.looping, settings.time);
     progress("finding sheets", 0.0);
+    let Folded { gbuffer, labels } = folds::unfold(gbuffer, &flat.tears, &grid, &image.labels, settings.least_pixels);
+    let (gbuffer, image) = (&gbuffer, &SourceImage { labels, ..image.clone() });
     let mut sheets = sheets::find(gbuffer, &grid, settings.least_pixels);
     let layers = Layers::of(&grid, &sheets);
     progress("fitting keys", 0.2);

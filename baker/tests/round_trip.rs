@@ -22,7 +22,8 @@ fn gbuffer(looping: bool) -> (GBuffer, SourceImage) {
     let texels = (0..width * height).map(|i| ((i % width) * 7 + (i / width) * 13) as u8).collect();
     let palette = (0..=255u8).map(|i| [i & 0xf8, i & 0xfc, (i << 3) & 0xf8]).collect();
     let image = SourceImage { width, height, texels, palette, covered: vec![true; (width * height) as usize], labels };
-    let mut gbuffer = GBuffer { width: SIZE[0], height: SIZE[1], frames: FRAMES, label: Vec::new(), uv: Vec::new() };
+    let mut gbuffer = GBuffer { width: SIZE[0], height: SIZE[1], frames: FRAMES, label: Vec::new(), uv: Default::default() };
+    let mut places = Vec::new();
     for frame in 0..FRAMES {
         let s = frame as f32 / FRAMES as f32;
         let s = if looping { 0.5 - 0.5 * (s * std::f32::consts::TAU).cos() } else { s };
@@ -31,10 +32,11 @@ fn gbuffer(looping: bool) -> (GBuffer, SourceImage) {
                 let board = [x as f32 + 160.5 - 10.0 - 55.0 * s, y as f32 + 4.5 - 12.0];
                 let on_board = (160.0..190.0).contains(&board[0]) && (4.0..44.0).contains(&board[1]);
                 gbuffer.label.push(if on_board { 2 } else { 1 });
-                gbuffer.uv.push(if on_board { board } else { [x as f32 + 10.5 + 30.0 * s, y as f32 + 5.5] });
+                places.push(if on_board { board } else { [x as f32 + 10.5 + 30.0 * s, y as f32 + 5.5] });
             }
         }
     }
+    gbuffer.uv = places.into();
     (gbuffer, image)
 }
 
