@@ -36,7 +36,11 @@ impl SheetsRef<'_> {
     /// The test of the sheet at `index`, front to back.
     #[must_use]
     pub const fn test(&self, index: usize) -> u16 {
-        self.tests.wrapping_shr((index as u32).wrapping_mul(2)) & 3
+        // The ninth sheet is always a last one: it has no bits, and must not read the first one's.
+        match self.tests.checked_shr((index as u32).wrapping_mul(2)) {
+            Some(bits) => bits & 3,
+            None => CHART,
+        }
     }
 }
 
@@ -269,5 +273,17 @@ impl<B: Bits> Coder<'_, B> {
         let width = usize::BITS.wrapping_sub(self.labels.saturating_sub(1).leading_zeros());
         let label = self.bits.flat(width, u32::from(want)) as usize;
         label.min(self.labels.saturating_sub(1)) as u8
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eight_sheets_have_tests_and_the_ninth_has_none() {
+        let sheets = SheetsRef { labels: &[0, 1, 2, 3, 4, 5, 6, 7, 8], tests: BOTH << 14 | FIELD };
+        let tests = core::array::from_fn(|index| sheets.test(index));
+        assert_eq!(tests, [FIELD, CHART, CHART, CHART, CHART, CHART, CHART, BOTH, CHART]);
     }
 }
