@@ -1,13 +1,15 @@
 //! The whole line: a scene in, a bundle out.
 //! The stages are the crate's modules; this runs them in order, times them, and reports progress.
 
-use crate::atlas::{self, Atlas, AtlasError};
-use crate::encode::{self, CodingSettings};
+use crate::atlas::{self, Atlas, AtlasError, SourceImage};
+use crate::encode::{self, CodingSettings, Content};
+use crate::folds::{self, Folded};
 use crate::gbuffer::Hits;
 use crate::scene::Scene;
 use crate::sheets::{self, KeyGrid, Layers};
 use crate::trace::Tracer;
-use crate::{fields, fit, order};
+use crate::verify::VerifyError;
+use crate::{fields, fit, order, tears};
 use cubist_core::format::TIME_CUBIC;
 use std::time::Instant;
 use thiserror::Error;
@@ -27,6 +29,37 @@ pub enum BakeError {
     /// There is no source image.
     #[error(transparent)]
     Atlas(#[from] AtlasError),
+    /// No ray of any frame hits a triangle.
+    #[error(
+        "the camera sees nothing: expected some of {rays} rays to hit a triangle, none does; check the camera's place, its direction and fov"
+    )]
+    Nothing {
+        /// Rays cast.
+        rays: u64,
+    },
+    /// Even the smallest bundle that a search found is too large.
+    #[error(
+        "--budget: expected room for {smallest} bytes, the smallest bundle of this scene, found {budget}; raise it, or lower --size or --frames"
+    )]
+    Budget {
+        /// Bytes allowed.
+        budget: u64,
+        /// Bytes of the smallest bundle found.
+        smallest: u64,
+    },
+    /// No bundle that a search found reaches the quality.
+    #[error(
+        "--psnr: found at most {nearest:.2} dB, expected {asked:.2} dB; ask for less, and leave --cell and --key-interval to the search"
+    )]
+    Psnr {
+        /// The mean PSNR asked for, dB.
+        asked: f64,
+        /// The best that a search found, dB.
+        nearest: f64,
+    },
+    /// The player refuses what was baked: a fault of the baker.
+    #[error(transparent)]
+    Verify(#[from] VerifyError),
     /// The scene is more than a bundle can hold.
     #[error("{what}: {found}, but a bundle holds at most {most}; {cure}")]
     Limit {
@@ -78,6 +111,8 @@ impl Default for Settings {
 pub struct Flat {
     /// The source image and the G-buffer in it.
     pub atlas: Atlas,
+    /// Where the G-buffer's charts hide parts of themselves (see [`tears`]).
+    pub tears: Vec<u8>,
     /// Rays cast.
     pub rays: u64,
     /// Seconds the rays took.
@@ -111,7 +146,9 @@ pub fn flatten(scene: &Scene, settings: &atlas::Settings, progress: Progress<'_>
     let ray_seconds = start.elapsed().as_secs_f64();
     let start = Instant::now();
     let atlas = atlas::build(scene, &hits, settings, &|done, total| progress("flattening surfaces", part(done, total)))?;
-    Ok(Flat { rays: hits.samples.len() as u64, atlas, ray_seconds, atlas_seconds: start.elapsed().as_secs_f64() })
+    progress("looking for tears", 0.0);
+    let tears = tears::find(scene, &tracer, &hits, &atlas.gbuffer);
+    Ok(Flat { tears, rays: hits.samples.len() as u64, atlas, ray_seconds, atlas_seconds: start.elapsed().as_secs_f64() })
 }
 
 /// Fits and codes the keys, and puts the bundle together.
@@ -129,6 +166,8 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let Atlas { image, gbuffer, .. } = &flat.atlas;
     let grid = KeyGrid::new(gbuffer, settings.cell.trailing_zeros() as u8, settings.key_interval, scene.playback.looping, settings.time);
     progress("finding sheets", 0.0);
+    let Folded { gbuffer, labels } = folds::unfold(gbuffer, &flat.tears, &grid, &image.labels, settings.least_pixels);
+    let (gbuffer, image) = (&gbuffer, &SourceImage { labels, ..image.clone() });
     let mut sheets = sheets::find(gbuffer, &grid, settings.least_pixels);
     let layers = Layers::of(&grid, &sheets);
     progress("fitting keys", 0.2);
@@ -143,7 +182,8 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     order::sort(&evidence, &mut sheets);
     progress("coding keys", 0.8);
     let header = encode::Frame { fps: scene.playback.fps, info: &scene.name };
-    let bundle = encode::bundle(gbuffer, &grid, image, &sheets, &layers, &fit, &fields, settings.coding, header);
+    let content = Content { gbuffer, grid: &grid, image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields };
+    let bundle = encode::bundle(&content, settings.coding, header);
     progress("coding keys", 1.0);
     Ok(Encoded { bundle, grid, dropped_pixels: sheets.dropped, seconds: start.elapsed().as_secs_f64() })
 }

@@ -40,8 +40,8 @@ pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers
             return None;
         }
         let seen = list.iter().position(|&label| gbuffer.label[pixel] == u16::from(label));
-        // What is hidden by a sheet further in front does not matter.
-        if seen.is_some_and(|seen| seen < sheet) {
+        // What is hidden by a sheet further in front does not matter, nor what no sheet shows.
+        if seen.is_none_or(|seen| seen < sheet) {
             return None;
         }
         let inside = seen == Some(sheet);
@@ -145,7 +145,7 @@ fn thin_labels(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, labels: usize
                 let look = |label| Look { gbuffer, grid, front: &[], label, reach: 2 * size };
                 let mut longest: Vec<(u8, usize, [f32; 2])> = Vec::new();
                 grid.each_pixel(frame, cell, |pixel, _| {
-                    let label = gbuffer.label[pixel] as u8;
+                    let Ok(label) = u8::try_from(gbuffer.label[pixel]) else { return };
                     let [left, right, up, down] = look(label).around(pixel, true);
                     let run = |a: Option<f32>, b: Option<f32>| a.zip(b).map_or(f32::INFINITY, |(a, b)| a + b);
                     let runs = [run(left, right), run(up, down)];

@@ -6,6 +6,7 @@ use crate::scene::Scene;
 use crate::trace::Tracer;
 use glam::DVec3;
 use rayon::prelude::*;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The surface number of a ray that leaves the scene.
@@ -28,8 +29,13 @@ pub struct Lens {
 impl Lens {
     /// The lens of frame `frame`; its rays equal those of [`crate::camera::Pose::direction`].
     pub fn new(scene: &Scene, frame: u32) -> Self {
+        Self::at(scene, f64::from(frame))
+    }
+
+    /// The lens at a moment between frames.
+    pub fn at(scene: &Scene, frame: f64) -> Self {
         let play = &scene.playback;
-        let pose = scene.camera.pose(play.parameter(f64::from(frame)));
+        let pose = scene.camera.pose(play.parameter(frame));
         let focal = 0.5 * f64::from(play.height) / libm::tan(0.5 * pose.fov * core::f64::consts::PI / 180.0);
         let half = [0.5 * f64::from(play.width), 0.5 * f64::from(play.height)];
         Self { eye: pose.eye, forward: pose.forward, focal, right: pose.right, up: pose.up, half }
@@ -118,7 +124,8 @@ impl Hits {
     }
 }
 
-/// Where every pixel of every frame falls in the source image.
+/// Where every pixel of every frame falls in the source image. The coordinates are shared between a buffer and its copies.
+#[derive(Clone)]
 pub struct GBuffer {
     /// Pixels a row.
     pub width: u32,
@@ -129,5 +136,5 @@ pub struct GBuffer {
     /// The label; 0 is the background. Frame-major, row-major.
     pub label: Vec<u16>,
     /// Coordinates in texels: texel (i, j) covers [i, i + 1) x [j, j + 1). Same order as the labels.
-    pub uv: Vec<[f32; 2]>,
+    pub uv: Arc<Vec<[f32; 2]>>,
 }

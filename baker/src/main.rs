@@ -1,2 +1,145 @@
 //! `cubist-bake`: scene in, bundle out.
-fn main() {}
+//! The command line comes from `cli`, files are written by `files`; the exit code is 0, 1 (the input is at fault), 2 (usage)
+//! or 130 (interrupted).
+
+mod cli;
+mod diagnostics;
+mod files;
+
+use anyhow::{Context, Result};
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser};
+use cli::{Bake, Cli, Command, Inspect, Playback, Throughput};
+use cubist_baker::inspect::Inspection;
+use cubist_baker::scene::Scene;
+use cubist_baker::{job, report, scene, trace};
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
+use std::io::{IsTerminal, Write};
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant;
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let result = match (&cli.command, &cli.bake.scene, &cli.bake.output) {
+        (Some(Command::Inspect(args)), ..) => inspect(args),
+        (Some(Command::Throughput(args)), ..) => throughput(args),
+        (None, Some(scene), Some(output)) => bake(scene, output, &cli.bake),
+        _ => Cli::command().error(ErrorKind::MissingRequiredArgument, "expected a SCENE and -o OUT.cubist").exit(),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::from(1)
+        }
+    }
+}
+
+fn bake(name: &str, output: &Path, args: &Bake) -> Result<()> {
+    files::clean_up_when_interrupted()?;
+    threads(args.threads)?;
+    files::check(output)?;
+    if let Some(path) = &args.report {
+        files::check(path)?;
+    }
+    let start = Instant::now();
+    let scene = load(name, &args.playback)?;
+    let options = args.options(start.elapsed().as_secs_f64());
+    let bar = bar(args.quiet);
+    let baked = job::run(&scene, &options, &|stage, part| {
+        bar.set_message(stage.to_owned());
+        bar.set_position((part * 1000.0) as u64);
+    });
+    bar.finish_and_clear();
+    let baked = baked.with_context(|| name.to_owned())?;
+    files::write(output, &baked.bundle)?;
+    if let Some(path) = &args.report {
+        files::write(path, (baked.report.json() + "\n").as_bytes())?;
+    }
+    if let Some(folder) = &args.diagnostics {
+        diagnostics::write(folder, &baked)?;
+    }
+    if args.quiet {
+        return Ok(());
+    }
+    for warning in &baked.report.warnings {
+        eprintln!("warning: {name}: {warning}");
+    }
+    print(&aligned(&report::table(&baked.report)))
+}
+
+fn inspect(args: &Inspect) -> Result<()> {
+    let name = args.bundle.display();
+    let bytes = std::fs::read(&args.bundle).with_context(|| format!("{name}: the bundle cannot be read"))?;
+    let inspection = Inspection::of(&bytes).with_context(|| name.to_string())?;
+    print(&if args.json { serde_json::to_string_pretty(&inspection)? + "\n" } else { inspection.text() })
+}
+
+fn throughput(args: &Throughput) -> Result<()> {
+    threads(args.threads)?;
+    let scene = load(&args.scene, &args.playback)?;
+    let figures = trace::throughput(&scene);
+    let ratio = if figures.obvhs_alone > 0.0 { figures.ours / figures.obvhs_alone } else { 0.0 };
+    if args.json {
+        let document = json!({
+            "scene": scene.name,
+            "triangles": scene.triangles.len(),
+            "rays": figures.rays,
+            "threads": rayon::current_num_threads(),
+            "g_buffer_mrays_per_second": figures.ours,
+            "obvhs_alone_mrays_per_second": figures.obvhs_alone,
+            "ratio": ratio,
+        });
+        return print(&(serde_json::to_string_pretty(&document)? + "\n"));
+    }
+    let row = |name: &str, value: String| (name.to_owned(), value);
+    print(&aligned(&[
+        row("scene", format!("{}: {} triangles", scene.name, report::grouped(scene.triangles.len()))),
+        row("rays", format!("{} on {} threads", report::grouped(figures.rays as usize), rayon::current_num_threads())),
+        row("G-buffer", format!("{:.2} million rays/s", figures.ours)),
+        row("obvhs alone", format!("{:.2} million rays/s", figures.obvhs_alone)),
+        row("ratio", format!("{:.1} %", 100.0 * ratio)),
+    ]))
+}
+
+/// Loads what SCENE names.
+fn load(name: &str, playback: &Playback) -> Result<Scene> {
+    let overrides =
+        scene::Overrides { size: playback.size, frames: playback.frames, fps: playback.fps, looping: playback.looping.then_some(true) };
+    Ok(match name.strip_prefix("builtin:") {
+        Some(builtin) => scene::load_builtin(builtin, &overrides)?,
+        None => scene::load(Path::new(name), &overrides)?,
+    })
+}
+
+fn threads(count: Option<u16>) -> Result<()> {
+    match count {
+        Some(count) => rayon::ThreadPoolBuilder::new().num_threads(count.into()).build_global().context("--threads: no threads to be had"),
+        None => Ok(()),
+    }
+}
+
+/// A progress bar of a thousand steps a stage; hidden where nobody watches.
+fn bar(quiet: bool) -> ProgressBar {
+    if quiet || !std::io::stderr().is_terminal() {
+        return ProgressBar::hidden();
+    }
+    let style = ProgressStyle::with_template("{msg:26} [{wide_bar}] {elapsed}").unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(1000).with_style(style)
+}
+
+/// Rows of name and value, the values in one column.
+fn aligned(rows: &[(String, String)]) -> String {
+    let widest = rows.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
+    rows.iter().map(|(name, value)| format!("{name:widest$}  {value}\n")).collect()
+}
+
+/// Writes to standard output; a reader that has seen enough (`| head`) is no error.
+fn print(text: &str) -> Result<()> {
+    match std::io::stdout().lock().write_all(text.as_bytes()) {
+        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        other => other.context("standard output cannot be written"),
+    }
+}

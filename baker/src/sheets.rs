@@ -153,7 +153,7 @@ pub fn find(gbuffer: &GBuffer, grid: &KeyGrid, least: u32) -> Sheets {
             let mut counts: Vec<(u8, u32)> = Vec::new();
             for frame in grid.frames_of(index / cells) {
                 grid.each_pixel(frame, index % cells, |pixel, _| {
-                    let label = gbuffer.label[pixel] as u8;
+                    let Ok(label) = u8::try_from(gbuffer.label[pixel]) else { return };
                     match counts.iter_mut().find(|(l, _)| *l == label) {
                         Some((_, count)) => *count += 1,
                         None => counts.push((label, 1)),

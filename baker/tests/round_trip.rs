@@ -1,7 +1,7 @@
 //! From a G-buffer to bytes to pixels: two sheets, one moving in front of the other.
 
 use cubist_baker::atlas::{Label, SourceImage};
-use cubist_baker::encode::{self, CodingSettings, Frame as Header};
+use cubist_baker::encode::{self, CodingSettings, Content, Frame as Header};
 use cubist_baker::gbuffer::GBuffer;
 use cubist_baker::sheets::{self, KeyGrid, Layers};
 use cubist_baker::{fields, fit, order};
@@ -22,7 +22,8 @@ fn gbuffer(looping: bool) -> (GBuffer, SourceImage) {
     let texels = (0..width * height).map(|i| ((i % width) * 7 + (i / width) * 13) as u8).collect();
     let palette = (0..=255u8).map(|i| [i & 0xf8, i & 0xfc, (i << 3) & 0xf8]).collect();
     let image = SourceImage { width, height, texels, palette, covered: vec![true; (width * height) as usize], labels };
-    let mut gbuffer = GBuffer { width: SIZE[0], height: SIZE[1], frames: FRAMES, label: Vec::new(), uv: Vec::new() };
+    let mut gbuffer = GBuffer { width: SIZE[0], height: SIZE[1], frames: FRAMES, label: Vec::new(), uv: Default::default() };
+    let mut places = Vec::new();
     for frame in 0..FRAMES {
         let s = frame as f32 / FRAMES as f32;
         let s = if looping { 0.5 - 0.5 * (s * std::f32::consts::TAU).cos() } else { s };
@@ -31,10 +32,11 @@ fn gbuffer(looping: bool) -> (GBuffer, SourceImage) {
                 let board = [x as f32 + 160.5 - 10.0 - 55.0 * s, y as f32 + 4.5 - 12.0];
                 let on_board = (160.0..190.0).contains(&board[0]) && (4.0..44.0).contains(&board[1]);
                 gbuffer.label.push(if on_board { 2 } else { 1 });
-                gbuffer.uv.push(if on_board { board } else { [x as f32 + 10.5 + 30.0 * s, y as f32 + 5.5] });
+                places.push(if on_board { board } else { [x as f32 + 10.5 + 30.0 * s, y as f32 + 5.5] });
             }
         }
     }
+    gbuffer.uv = places.into();
     (gbuffer, image)
 }
 
@@ -49,7 +51,8 @@ fn bake(gbuffer: &GBuffer, image: &SourceImage, looping: bool, independent_every
     evidence.fields = Some(&fields);
     order::sort(&evidence, &mut sheets);
     let settings = CodingSettings { step_log2: 0, lambda: 0.0, independent_every };
-    encode::bundle(gbuffer, &grid, image, &sheets, &layers, &fit, &fields, settings, Header { fps: 30, info: "two sheets" })
+    let content = Content { gbuffer, grid: &grid, image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields };
+    encode::bundle(&content, settings, Header { fps: 30, info: "two sheets" })
 }
 
 fn play(bytes: &[u8], frames: impl Iterator<Item = u32>) -> Vec<Vec<u16>> {

@@ -57,12 +57,20 @@ pub fn weights(time: u8, lengths: [u32; 3], passed: u32) -> WeightSet {
     let arriving = cube.wrapping_sub(square);
     let set = |missing: usize| {
         let (first, last) = (missing & 1 == 0, missing & 2 == 0);
-        let leave = if first { share(leaving, length, before.wrapping_add(length)) } else { leaving };
-        let arrive = if last { share(arriving, length, length.wrapping_add(after)) } else { arriving };
-        let w0 = if first { rounded(leave.wrapping_neg()) } else { 0 };
-        let w3 = if last { rounded(arrive) } else { 0 };
-        // A missing key's tangent is the secant of the interval itself.
-        let w2 = rounded(value.wrapping_add(leave).wrapping_add(if last { 0 } else { arrive }));
+        // The secants over two intervals at either end, as shares of the interval's own.
+        let leave = |x: i64| share(x, length, before.wrapping_add(length));
+        let arrive = |x: i64| share(x, length, length.wrapping_add(after));
+        let (w0, w2, w3) = match (first, last) {
+            (true, true) => (leave(leaving).wrapping_neg(), value.wrapping_add(leave(leaving)), arrive(arriving)),
+            // The missing tangent is the one that makes the curve a parabola through the three keys there are.
+            (false, true) => (0, value.wrapping_add(leaving.wrapping_mul(2)), arrive(arriving.wrapping_sub(leaving))),
+            (true, false) => {
+                let w0 = leave(arriving.wrapping_sub(leaving));
+                (w0, value.wrapping_sub(w0).wrapping_add(arriving.wrapping_mul(2)), 0)
+            }
+            (false, false) => (0, t, 0),
+        };
+        let (w0, w2, w3) = (rounded(w0), rounded(w2), rounded(w3));
         [w0, ONE.wrapping_sub(w0).wrapping_sub(w2).wrapping_sub(w3), w2, w3]
     };
     [set(0), set(1), set(2), set(3)]

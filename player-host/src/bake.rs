@@ -1,7 +1,10 @@
 //! The one place where the player calls the baker.
 //! A scene comes in from `input`; bundle bytes and rows for the table go back.
 
-use anyhow::{Result, bail};
+use anyhow::{Context, Result};
+use cubist_baker::job::{self, Options, TruthFrames};
+use cubist_baker::report;
+use cubist_baker::scene::{self, Overrides};
 use std::path::Path;
 
 /// What to bake.
@@ -16,11 +19,16 @@ pub enum Scene<'a> {
 /// A bundle, and rows of name and value for the table.
 pub type Baked = (Vec<u8>, Vec<(String, String)>);
 
-/// Bakes `scene`; `progress` hears the stage by name and how much of everything is done, 0 to 1.
-pub fn bake(scene: Scene<'_>, progress: &dyn Fn(&str, f32)) -> Result<Baked> {
-    progress("bake", 0.0);
-    match scene {
-        Scene::Builtin(name) => bail!("built-in scene \"{name}\": baking is wired in later"),
-        Scene::File(path) => bail!("{}: baking is wired in later", path.display()),
-    }
+/// Bakes `scene`; `progress` hears the stage by name and how much of it is done, 0 to 1.
+pub fn bake(scene: Scene<'_>, progress: &(dyn Fn(&str, f32) + Sync)) -> Result<Baked> {
+    progress("reading the scene", 0.0);
+    let (scene, name) = match scene {
+        Scene::Builtin(name) => (scene::load_builtin(name, &Overrides::default())?, name.to_owned()),
+        Scene::File(path) => (scene::load(path, &Overrides::default())?, path.display().to_string()),
+    };
+    // Someone waits for the picture: the antialiased truth is for `cubist-bake --report`.
+    let options = Options { truth: TruthFrames::None, ..Options::default() };
+    let hear = |stage: &str, part: f64| progress(stage, part as f32);
+    let (bundle, report) = job::bake_scene(&scene, &options, &hear).with_context(|| name)?;
+    Ok((bundle, report::table(&report)))
 }

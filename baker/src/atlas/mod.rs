@@ -10,6 +10,7 @@ use crate::gbuffer::{BACKGROUND, GBuffer, Hits};
 use crate::scene::{Background, Scene};
 use crate::shade::Shader;
 use rayon::prelude::*;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use thiserror::Error;
 
@@ -227,7 +228,7 @@ fn locate(scene: &Scene, hits: &Hits, charting: &Charting, layout: &pack::Layout
     });
     let plain = |v: Vec<AtomicU32>| v.into_iter().map(AtomicU32::into_inner).collect();
     let frames = scene.playback.frames;
-    (GBuffer { width: hits.width, height: hits.height, frames, label, uv }, Seen { count: plain(count), first: plain(first) })
+    (GBuffer { width: hits.width, height: hits.height, frames, label, uv: Arc::new(uv) }, Seen { count: plain(count), first: plain(first) })
 }
 
 /// The labels: the rectangles around their charts.

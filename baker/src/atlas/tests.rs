@@ -107,7 +107,7 @@ fn made(scene: &Scene, hits: &Hits) -> Atlas {
 }
 
 fn seen<'a>(hits: &'a Hits, atlas: &'a Atlas) -> impl Iterator<Item = (&'a Sample, u16, [f32; 2])> {
-    hits.samples.iter().zip(&atlas.gbuffer.label).zip(&atlas.gbuffer.uv).map(|((s, &l), &uv)| (s, l, uv))
+    hits.samples.iter().zip(&atlas.gbuffer.label).zip(atlas.gbuffer.uv.iter()).map(|((s, &l), &uv)| (s, l, uv))
 }
 
 fn texel(image: &SourceImage, uv: [f32; 2]) -> usize {

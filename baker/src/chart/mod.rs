@@ -84,12 +84,15 @@ impl Charting {
 }
 
 /// Cuts what is seen into charts with at most `density` texels a pixel, for a source image of sides up to `max_side`.
-/// A scene that brings its own flattening (every triangle has an island) keeps it.
+/// A scene that brings its own flattening (every triangle has an island) keeps it, at `density` of its texels, at most all.
 pub fn build(scene: &Scene, hits: &Hits, density: f64, max_side: u32) -> Charting {
     let own = !scene.triangles.is_empty() && scene.triangles.iter().all(|t| t.island.is_some());
     let (faces, links) = observe::observe(scene, hits, !own);
     if own {
-        return islands::build(scene, hits, faces);
+        let mut charting = islands::build(scene, hits, faces);
+        // The scene's own texels are the finest there are.
+        charting.charts.iter_mut().for_each(|chart| chart.density *= density.min(1.0));
+        return charting;
     }
     let mut clusters = grow::grow(&faces, &links);
     absorb::absorb(&faces, &links, &mut clusters, hits.samples.len());

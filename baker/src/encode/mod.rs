@@ -39,25 +39,34 @@ pub struct Frame<'a> {
     pub info: &'a str,
 }
 
+/// Everything that becomes a bundle.
+#[derive(Clone, Copy)]
+pub struct Content<'a> {
+    /// What is really seen; it tells visible layers from ghosts.
+    pub gbuffer: &'a GBuffer,
+    /// The key-ray grid.
+    pub grid: &'a KeyGrid,
+    /// The source image.
+    pub image: &'a SourceImage,
+    /// The sheets, front to back.
+    pub sheets: &'a Sheets,
+    /// The layers they share.
+    pub layers: &'a Layers,
+    /// The layers' positions.
+    pub fit: &'a Fit,
+    /// The layers' fields.
+    pub fields: &'a Fields,
+}
+
 /// Makes the bytes of a bundle.
 #[must_use]
-#[expect(clippy::too_many_arguments, reason = "the end of the line: everything comes together here")]
-pub fn bundle(
-    gbuffer: &GBuffer,
-    grid: &KeyGrid,
-    image: &SourceImage,
-    sheets: &Sheets,
-    layers: &Layers,
-    fit: &Fit,
-    fields: &Fields,
-    settings: CodingSettings,
-    frame: Frame<'_>,
-) -> Vec<u8> {
+pub fn bundle(content: &Content<'_>, settings: CodingSettings, frame: Frame<'_>) -> Vec<u8> {
+    let &Content { gbuffer, grid, image, .. } = content;
     let mut labels: Vec<LabelRecord> = image.labels.iter().map(label_record).collect();
-    for (record, &strip) in labels.iter_mut().zip(&fields.strip) {
+    for (record, &strip) in labels.iter_mut().zip(&content.fields.strip) {
         record.flags |= if strip { STRIP } else { 0 };
     }
-    let (table, records) = keys(gbuffer, grid, sheets, layers, fit, fields, &labels, settings);
+    let (table, records) = keys(content, &labels, settings);
     let path = Path {
         width: gbuffer.width as u16,
         height: gbuffer.height as u16,
@@ -67,7 +76,7 @@ pub fn bundle(
         cell_log2: grid.grid.log2 as u8,
         time: grid.time,
         step_log2: settings.step_log2,
-        limits: limits(grid, sheets, layers, &labels, settings),
+        limits: limits(content, &labels, settings),
         table: &table,
         records: &records,
     };
@@ -130,14 +139,17 @@ fn label_record(label: &crate::atlas::Label) -> LabelRecord {
 /// Fields that layers have to carry for the tests in `sheets`.
 fn fields_used(sheets: &Sheets, labels: &[LabelRecord]) -> u8 {
     let per_sheet = |(list, &tests): (&Vec<u8>, &u16)| {
-        let tested = list.iter().enumerate().filter(move |(at, _)| tests >> (2 * at) & 3 != lists::CHART);
+        // The last sheet passes without a test: there are no bits for the ninth.
+        let tested =
+            list.iter().take(list.len().saturating_sub(1)).enumerate().filter(move |(at, _)| tests >> (2 * at) & 3 != lists::CHART);
         tested.map(|(_, &label)| if labels[usize::from(label)].flags & STRIP != 0 { 2 } else { 1 }).max()
     };
     sheets.lists.iter().zip(&sheets.tests).filter_map(per_sheet).max().unwrap_or(0)
 }
 
 /// The bounds that the lists and layers keep.
-fn limits(grid: &KeyGrid, sheets: &Sheets, layers: &Layers, labels: &[LabelRecord], settings: CodingSettings) -> Limits {
+fn limits(content: &Content<'_>, labels: &[LabelRecord], settings: CodingSettings) -> Limits {
+    let &Content { grid, sheets, layers, .. } = content;
     let (cells, nodes) = (grid.grid.cells(), grid.grid.nodes());
     let count = |from: usize, to: usize| (layers.start[to] - layers.start[from]) as usize;
     let most = |values: &mut dyn Iterator<Item = usize>| u16::try_from(values.max().unwrap_or(0)).unwrap_or(u16::MAX);
@@ -155,17 +167,9 @@ fn limits(grid: &KeyGrid, sheets: &Sheets, layers: &Layers, labels: &[LabelRecor
 }
 
 /// The key table and the records.
-fn keys(
-    gbuffer: &GBuffer,
-    grid: &KeyGrid,
-    sheets: &Sheets,
-    layers: &Layers,
-    fit: &Fit,
-    fields: &Fields,
-    labels: &[LabelRecord],
-    settings: CodingSettings,
-) -> (Vec<u8>, Vec<u8>) {
-    let bounds = limits(grid, sheets, layers, labels, settings);
+fn keys(content: &Content<'_>, labels: &[LabelRecord], settings: CodingSettings) -> (Vec<u8>, Vec<u8>) {
+    let grid = content.grid;
+    let bounds = limits(content, labels, settings);
     let mut memory = Memory::new(grid, bounds);
     let mut stream = memory.stream();
     let shape = Shape {
@@ -184,7 +188,7 @@ fn keys(
             has_after: position < grid.intervals(),
             lengths: [grid.length(position as isize - 1), grid.length(position as isize - 2)],
         };
-        let mut source = Wanted { gbuffer, grid, sheets, layers, fit, fields, settings, key: position };
+        let mut source = Wanted { content, settings, key: position };
         let mut encoder = Encoder::default();
         stream.code(&mut encoder, shape, place, &mut source);
         records.extend(encoder.finish());
@@ -233,12 +237,7 @@ impl Memory {
 
 /// What the encoder wants to say.
 struct Wanted<'a> {
-    gbuffer: &'a GBuffer,
-    grid: &'a KeyGrid,
-    sheets: &'a Sheets,
-    layers: &'a Layers,
-    fit: &'a Fit,
-    fields: &'a Fields,
+    content: &'a Content<'a>,
     settings: CodingSettings,
     key: usize,
 }
@@ -246,37 +245,37 @@ struct Wanted<'a> {
 impl Wanted<'_> {
     /// Whether the node's own ray sees `label` at the key.
     fn visible(&self, node: usize, label: u8) -> bool {
-        let size = 1usize << self.grid.grid.log2;
-        let width = self.grid.grid.node_columns();
-        let x = (node % width * size).min(self.grid.size[0] - 1);
-        let y = (node / width * size).min(self.grid.size[1] - 1);
-        let frame = self.grid.keys[self.key] as usize;
-        self.gbuffer.label[(frame * self.grid.size[1] + y) * self.grid.size[0] + x] == u16::from(label)
+        let size = 1usize << self.content.grid.grid.log2;
+        let width = self.content.grid.grid.node_columns();
+        let x = (node % width * size).min(self.content.grid.size[0] - 1);
+        let y = (node / width * size).min(self.content.grid.size[1] - 1);
+        let frame = self.content.grid.keys[self.key] as usize;
+        self.content.gbuffer.label[(frame * self.content.grid.size[1] + y) * self.content.grid.size[0] + x] == u16::from(label)
     }
 }
 
 impl Source for Wanted<'_> {
     fn sheets(&mut self, ahead: bool, cell: usize) -> lists::Sheets {
-        let intervals = self.grid.intervals();
+        let intervals = self.content.grid.intervals();
         let interval = if ahead { self.key } else { (self.key + intervals - 1) % intervals };
-        let index = interval * self.grid.grid.cells() + cell;
-        let labels = self.sheets.lists[index].iter().copied().collect();
-        lists::Sheets { labels, tests: self.sheets.tests[index] }
+        let index = interval * self.content.grid.grid.cells() + cell;
+        let labels = self.content.sheets.lists[index].iter().copied().collect();
+        lists::Sheets { labels, tests: self.content.sheets.tests[index] }
     }
 
     fn field(&mut self, node: usize, label: u8, which: usize) -> i8 {
-        let layer = self.layers.find(self.key * self.grid.grid.nodes() + node, label);
-        layer.map_or(0, |layer| field_code(libm::roundf(self.fields.uv[layer][which] * 256.0) as i32))
+        let layer = self.content.layers.find(self.key * self.content.grid.grid.nodes() + node, label);
+        layer.map_or(0, |layer| field_code(libm::roundf(self.content.fields.uv[layer][which] * 256.0) as i32))
     }
 
     fn residual(&mut self, node: usize, label: u8, predicted: [i32; 2], contexts: [&[Probability]; 2]) -> [i32; 2] {
-        let Some(layer) = self.layers.find(self.key * self.grid.grid.nodes() + node, label) else { return [0, 0] };
+        let Some(layer) = self.content.layers.find(self.key * self.content.grid.grid.nodes() + node, label) else { return [0, 0] };
         let unit = (1u32 << KEY_BITS) as f32;
         let step = (1u32 << self.settings.step_log2) as f32 / unit;
         let free = self.settings.lambda > 0.0 && !self.visible(node, label);
         let mut residual = [0, 0];
         for axis in 0..2 {
-            let wanted = self.fit.uv[layer][axis].clamp(KEY_MIN as f32 / unit, KEY_MAX as f32 / unit);
+            let wanted = self.content.fit.uv[layer][axis].clamp(KEY_MIN as f32 / unit, KEY_MAX as f32 / unit);
             let exact = (wanted - predicted[axis] as f32 / unit) / step;
             let nearest = libm::roundf(exact) as i32;
             residual[axis] = nearest;
@@ -286,7 +285,7 @@ impl Source for Wanted<'_> {
             // A ghost is seen through interpolation only: what its exact value gains is weighed against its bits.
             let cost = |value: i32| {
                 let error = (value as f32 - exact) * step;
-                self.fit.weight[layer] * error * error + self.settings.lambda * range::price(contexts[axis], value) as f32
+                self.content.fit.weight[layer] * error * error + self.settings.lambda * range::price(contexts[axis], value) as f32
             };
             let mut best = (cost(nearest), nearest);
             for value in [nearest - nearest.signum(), nearest / 2, 0] {

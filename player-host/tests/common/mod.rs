@@ -30,7 +30,7 @@ pub fn bundle() -> Vec<u8> {
         cell_log2: 3,
         time: TIME_LINEAR,
         step_log2: 0,
-        limits: Limits { key_layers: 2000, row_layers: 400, list_bytes: 2000, row_sheets: 80, cell_sheets: 4, seek_keys: 4 },
+        limits: Limits { key_layers: 2000, row_layers: 400, list_bytes: 2000, row_sheets: 80, cell_sheets: 4, fields: 0, seek_keys: 4 },
         table: &table,
         records: &records,
     };

@@ -1,0 +1,285 @@
+//! The command line: what may be typed, and what it means.
+//! Arguments come in; checked options go to `main`.
+
+use clap::{Args, Parser, Subcommand};
+use cubist_baker::atlas;
+use cubist_baker::{Goal, Options, TruthFrames};
+use std::path::PathBuf;
+
+/// Bakes a 3D scene and a camera path into a small bundle that plays on microcontrollers.
+#[derive(Debug, Parser)]
+#[command(name = "cubist-bake", version, args_conflicts_with_subcommands = true, subcommand_negates_reqs = true, after_help = EXAMPLES)]
+pub struct Cli {
+    /// Anything but baking.
+    #[command(subcommand)]
+    pub command: Option<Command>,
+    /// Baking.
+    #[command(flatten)]
+    pub bake: Bake,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  cubist-bake lantern.toml -o lantern.cubist
+  cubist-bake fox.glb -o fox.cubist --size 240x240 --frames 90 --looping
+                                         a model alone: a full circle around it
+  cubist-bake builtin:street -o street.cubist --report street.json
+  cubist-bake fox.glb -o fox.cubist --budget 64K
+                                         at most 64 x 1024 bytes, at the best quality that fits
+  cubist-bake fox.glb -o fox.cubist --psnr 32
+                                         the smallest bundle of that quality
+  cubist-bake inspect fox.cubist         what a bundle holds, byte by section
+
+If something looks wrong, --diagnostics DIR shows the source image, and exact frames next to played ones.
+Exit codes: 0 done, 1 the input is at fault, 2 usage, 130 interrupted.";
+
+/// The commands besides baking.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Prints what a bundle holds: sections, header, keys, source image, labels, memory, limits.
+    Inspect(Inspect),
+    /// Measures ray casting on a scene against its ray library alone, with the same rays.
+    Throughput(Throughput),
+}
+
+/// What `cubist-bake SCENE` takes.
+#[derive(Args, Debug)]
+pub struct Bake {
+    /// A scene file (.toml), a model (.glb .gltf .obj .ply), or builtin:NAME.
+    #[arg(required = true)]
+    pub scene: Option<String>,
+    /// The bundle to write; folders on the way are made.
+    #[arg(short, long, value_name = "OUT.cubist", required = true)]
+    pub output: Option<PathBuf>,
+    /// What replaces the scene's playback.
+    #[command(flatten)]
+    pub playback: Playback,
+    /// Side of a cell of the key-ray grid, pixels: 4, 8, 16 or 32 [default: 8; 16 on screens over 640 wide].
+    ///
+    /// Smaller cells follow outlines better and take more bytes and memory.
+    #[arg(long, value_name = "PX", value_parser = cell)]
+    pub cell: Option<u32>,
+    /// Frames between keys, 1 to 256 [default: 8].
+    #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(1..=256))]
+    pub key_interval: Option<u32>,
+    /// Largest side of the source image, texels, 64 to 1024.
+    #[arg(long, value_name = "MAX_SIDE", default_value_t = atlas::Settings::default().max_side, value_parser = clap::value_parser!(u32).range(64..=1024))]
+    pub atlas: u32,
+    /// Texels a pixel where a surface is seen closest, 0.05 to 8; 0.7 halves the source image.
+    #[arg(long, value_name = "RATIO", default_value_t = atlas::Settings::default().density, value_parser = density)]
+    pub density: f64,
+    /// Colours of the source image, at most, 2 to 256.
+    #[arg(long, value_name = "N", default_value_t = atlas::Settings::default().colours as u16, value_parser = clap::value_parser!(u16).range(2..=256))]
+    pub colours: u16,
+    /// Every Nth key needs no earlier one: a seek decodes at most N + 1 keys.
+    #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub independent_every: u16,
+    /// The whole bundle takes at most this many bytes (also 256K, 2M), at the best quality that does.
+    ///
+    /// Quality is measured against the antialiased scene; cells, keys and the source image are searched.
+    #[arg(long, value_name = "BYTES", value_parser = budget, conflicts_with = "psnr")]
+    pub budget: Option<u64>,
+    /// The smallest bundle whose mean PSNR against exact rays through its source image reaches this many dB.
+    ///
+    /// Cells and keys are searched; the source image stays as --atlas and --density ask, and gets coarser only where nothing
+    /// else reaches the goal.
+    #[arg(long, value_name = "DB", value_parser = psnr)]
+    pub psnr: Option<f64>,
+    /// Writes bytes, seconds, quality and warnings as JSON.
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+    /// Writes pictures: the source image with the charts' borders, the covered texels, three frames and the worst one, exact and played.
+    #[arg(long, value_name = "DIR")]
+    pub diagnostics: Option<PathBuf>,
+    /// Frames compared with the antialiased scene: a number (evenly spread over the path), all, or none.
+    #[arg(long, value_name = "FRAMES", default_value = "16", value_parser = truth)]
+    pub truth: TruthFrames,
+    /// Threads; the bundle is the same on any number [default: all processors].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// No progress, no table, no warnings: errors only.
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+/// What replaces the scene's playback.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct Playback {
+    /// Screen, pixels: 320x240; up to 4096 a side.
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<(u32, u32)>,
+    /// Frames, 1 to 65535.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=65_535))]
+    pub frames: Option<u32>,
+    /// Frames per second, 1 to 1000.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1000))]
+    pub fps: Option<u16>,
+    /// Frame 0 follows the last frame.
+    #[arg(long)]
+    pub looping: bool,
+}
+
+/// What `cubist-bake inspect` takes.
+#[derive(Args, Debug)]
+pub struct Inspect {
+    /// The bundle.
+    pub bundle: PathBuf,
+    /// Prints one JSON document and nothing else.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What `cubist-bake throughput` takes.
+#[derive(Args, Debug)]
+pub struct Throughput {
+    /// A scene file (.toml), a model (.glb .gltf .obj .ply), or builtin:NAME.
+    pub scene: String,
+    /// What replaces the scene's playback.
+    #[command(flatten)]
+    pub playback: Playback,
+    /// Threads [default: all processors].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
+    /// Prints one JSON document and nothing else.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Bake {
+    /// The baker's options.
+    #[must_use]
+    pub fn options(&self, load_seconds: f64) -> Options {
+        let goal = match (self.budget, self.psnr) {
+            (Some(budget), _) => Goal::Budget(budget),
+            (None, Some(psnr)) => Goal::Psnr(psnr),
+            (None, None) => Goal::AsSet,
+        };
+        Options {
+            cell: self.cell,
+            key_interval: self.key_interval,
+            source: atlas::Settings { max_side: self.atlas, density: self.density, colours: self.colours.into() },
+            independent_every: self.independent_every.into(),
+            goal,
+            truth: self.truth,
+            load_seconds,
+        }
+    }
+}
+
+fn cell(text: &str) -> Result<u32, String> {
+    match text {
+        "4" | "8" | "16" | "32" => text.parse().map_err(|_| String::new()),
+        _ => Err("expected 4, 8, 16 or 32 pixels".to_owned()),
+    }
+}
+
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let expected = || "expected WIDTHxHEIGHT, as in 320x240, 1 to 4096 pixels each".to_owned();
+    let (width, height) = text.split_once(['x', 'X']).ok_or_else(expected)?;
+    let side = |text: &str| text.parse().ok().filter(|side| (1..=4096).contains(side)).ok_or_else(expected);
+    Ok((side(width)?, side(height)?))
+}
+
+/// A number of bytes; K is 1024 of them, M 1024 K. Fractions are fine before K and M: 1.5M.
+fn budget(text: &str) -> Result<u64, String> {
+    let expected = || "expected a number of bytes, as in 65536, 64K or 1.5M".to_owned();
+    let (digits, unit) = match text.as_bytes().last().map(u8::to_ascii_uppercase) {
+        Some(b'K') => (&text[..text.len() - 1], 1u64 << 10),
+        Some(b'M') => (&text[..text.len() - 1], 1 << 20),
+        _ => (text, 1),
+    };
+    if digits.is_empty() || !digits.bytes().all(|b| b.is_ascii_digit() || (b == b'.' && unit > 1)) {
+        return Err(expected());
+    }
+    let bytes = if digits.contains('.') {
+        // A cast saturates: what is too large stays too large.
+        (digits.parse::<f64>().map_err(|_| expected())? * unit as f64) as u64
+    } else {
+        digits.parse::<u64>().ok().and_then(|whole| whole.checked_mul(unit)).ok_or_else(expected)?
+    };
+    if bytes == 0 { Err(expected()) } else { Ok(bytes) }
+}
+
+fn ranged(text: &str, range: std::ops::RangeInclusive<f64>, what: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|value| range.contains(value)).ok_or_else(|| format!("expected {what}, {} to {}", range.start(), range.end()))
+}
+
+fn density(text: &str) -> Result<f64, String> {
+    ranged(text, 0.05..=8.0, "texels a pixel")
+}
+
+fn psnr(text: &str) -> Result<f64, String> {
+    ranged(text, 1.0..=99.0, "decibels")
+}
+
+fn truth(text: &str) -> Result<TruthFrames, String> {
+    match text {
+        "all" => Ok(TruthFrames::All),
+        "none" => Ok(TruthFrames::None),
+        _ => match text.parse::<u32>() {
+            Ok(0) => Ok(TruthFrames::None),
+            Ok(most) => Ok(TruthFrames::Most(most)),
+            Err(_) => Err("expected a number of frames, all, or none".to_owned()),
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn budgets_count_in_1024s() {
+        for (text, bytes) in [("1", 1), ("65536", 65_536), ("256K", 262_144), ("2M", 2_097_152), ("2m", 2_097_152), ("1.5k", 1536)] {
+            assert_eq!(budget(text), Ok(bytes), "{text}");
+        }
+        for text in [
+            "",
+            "K",
+            "0",
+            "0K",
+            "-1",
+            "1.5",
+            "1e3",
+            "64KB",
+            "64 K",
+            "K64",
+            "99999999999999999999",
+            "99999999999999999M",
+            "1.2.3K",
+            "µ",
+            "6µ",
+        ] {
+            assert!(budget(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn sizes_are_width_and_height() {
+        assert_eq!(size("320x240"), Ok((320, 240)));
+        assert_eq!(size("64X48"), Ok((64, 48)));
+        for text in ["320", "320x", "x240", "0x240", "320x5000", "-1x5", "320x240x3", "320 x 240"] {
+            assert!(size(text).is_err(), "{text}");
+        }
+    }
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+        let cli = Cli::try_parse_from(["cubist-bake", "a.toml", "-o", "a.cubist", "--budget", "64K", "--truth", "all"]).unwrap();
+        let options = cli.bake.options(0.5);
+        assert_eq!((options.goal, options.truth, options.load_seconds), (Goal::Budget(65_536), TruthFrames::All, 0.5));
+        assert!(Cli::try_parse_from(["cubist-bake", "inspect", "a.cubist", "--json"]).unwrap().command.is_some());
+        for wrong in [
+            &["cubist-bake", "a.toml"][..],
+            &["cubist-bake", "a.toml", "-o", "b", "--budget", "1K", "--psnr", "30"],
+            &["cubist-bake", "a.toml", "-o", "b", "--cell", "7"],
+            &["cubist-bake", "a.toml", "-o", "b", "--psnr", "nan"],
+            &["cubist-bake", "a.toml", "-o", "b", "--atlas", "32"],
+            &["cubist-bake", "a.toml", "-o", "b", "--truth", "some"],
+        ] {
+            assert!(Cli::try_parse_from(wrong).is_err(), "{wrong:?}");
+        }
+    }
+}

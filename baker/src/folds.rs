@@ -1,0 +1,225 @@
+//! Folds: the torn parts of a chart that one cell sees get labels of their own, so that each is a sheet.
+//! Tears come from `tears`; the G-buffer with the finer labels goes to `sheets` and on. An *alias* label has the
+//! same chart as the label it stands for; the player knows nothing of it.
+
+use crate::atlas::Label;
+use crate::gbuffer::GBuffer;
+use crate::sheets::KeyGrid;
+use crate::tears::{DOWN, NEXT, RIGHT};
+use rayon::prelude::*;
+
+/// The label of a pixel that belongs to no sheet: a part too small to keep.
+pub const NONE: u16 = u16::MAX;
+/// Parts of one chart that are told apart where they meet.
+const PARTS: usize = 4;
+/// The most labels there are.
+const MOST_LABELS: usize = 256;
+
+/// The G-buffer with aliases, and all labels.
+pub struct Folded {
+    /// Positions as before, labels finer.
+    pub gbuffer: GBuffer,
+    /// The labels, aliases after the others.
+    pub labels: Vec<Label>,
+}
+
+/// Tells the torn parts apart. Parts of fewer than `least` pixels in a cell and interval are given up.
+#[must_use]
+pub fn unfold(gbuffer: &GBuffer, tears: &[u8], grid: &KeyGrid, labels: &[Label], least: u32) -> Folded {
+    let parts = Parts::find(gbuffer, tears, grid, least);
+    let mut folded = Folded { gbuffer: gbuffer.clone(), labels: labels.to_vec() };
+    let Some(part) = parts.assign(gbuffer, tears, grid) else { return folded };
+    // The largest parts get a label first.
+    let mut sizes = vec![[0u64; PARTS]; labels.len()];
+    for (&label, &part) in gbuffer.label.iter().zip(&part) {
+        if usize::from(part) < PARTS {
+            sizes[usize::from(label)][usize::from(part)] += 1;
+        }
+    }
+    let mut wanted: Vec<(u64, usize, usize)> = Vec::new();
+    for (label, sizes) in sizes.iter().enumerate() {
+        wanted.extend((1..PARTS).filter(|&part| sizes[part] > 0).map(|part| (sizes[part], label, part)));
+    }
+    wanted.sort_by_key(|&(size, label, part)| (std::cmp::Reverse(size), label, part));
+    let mut alias: Vec<[u16; PARTS]> = (0..labels.len()).map(|label| [label as u16; PARTS]).collect();
+    for &(_, label, part) in wanted.iter().take(MOST_LABELS.saturating_sub(labels.len())) {
+        alias[label][part] = folded.labels.len() as u16;
+        folded.labels.push(labels[label].clone());
+    }
+    folded.gbuffer.label.par_iter_mut().zip(part).for_each(|(label, part)| {
+        *label = if usize::from(part) < PARTS { alias[usize::from(*label)][usize::from(part)] } else { NONE };
+    });
+    folded
+}
+
+/// The torn cells' pixels, by the part they belong to.
+struct Parts {
+    /// Cells (interval times cells plus cell) with tears, ascending, and for each pixel of theirs, frame by frame and row by row,
+    /// its part: a number within the cell, [`NONE`] where it was given up.
+    torn: Vec<(usize, Vec<u16>)>,
+}
+
+impl Parts {
+    fn find(gbuffer: &GBuffer, tears: &[u8], grid: &KeyGrid, least: u32) -> Self {
+        let cells = grid.grid.cells();
+        let torn = (0..grid.intervals() * cells)
+            .into_par_iter()
+            .filter_map(|index| {
+                let block = Block::new(grid, index / cells, index % cells);
+                let inside = |pixel: usize, place: usize| block.steps(place).iter().any(|&(bit, _, _)| tears[pixel] & bit != 0);
+                let any = block.pixels(grid).enumerate().any(|(place, pixel)| tears[pixel] != 0 && inside(pixel, place));
+                any.then(|| (index, block.parts(gbuffer, tears, grid, least)))
+            })
+            .collect();
+        Self { torn }
+    }
+
+    /// A part number for every pixel, the same across cells as far as they agree; `None` where nothing is torn.
+    fn assign(&self, gbuffer: &GBuffer, tears: &[u8], grid: &KeyGrid) -> Option<Vec<u8>> {
+        if self.torn.is_empty() {
+            return None;
+        }
+        let mut folding = vec![false; 1 << 16];
+        for (index, _) in &self.torn {
+            let block = Block::new(grid, index / grid.grid.cells(), index % grid.grid.cells());
+            for (place, pixel) in block.pixels(grid).enumerate() {
+                if block.steps(place).iter().any(|&(bit, _, _)| tears[pixel] & bit != 0) {
+                    folding[usize::from(gbuffer.label[pixel])] = true;
+                }
+            }
+        }
+        let mut part = vec![0u8; gbuffer.label.len()];
+        let mut torn = self.torn.iter().peekable();
+        for index in 0..grid.intervals() * grid.grid.cells() {
+            let own = torn.next_if(|(at, _)| *at == index).map(|(_, parts)| parts.as_slice());
+            let block = Block::new(grid, index / grid.grid.cells(), index % grid.grid.cells());
+            block.adopt(gbuffer, tears, grid, &folding, own, &mut part);
+        }
+        Some(part)
+    }
+}
+
+/// The pixels of one cell and interval.
+struct Block {
+    interval: usize,
+    cell: usize,
+    /// Pixels across, down, and frames.
+    size: [usize; 3],
+    /// G-buffer pixels to the next row and frame.
+    stride: [usize; 2],
+}
+
+impl Block {
+    fn new(grid: &KeyGrid, interval: usize, cell: usize) -> Self {
+        let [columns, rows] = grid.pixels(cell);
+        let size = [columns.len(), rows.len(), grid.frames_of(interval).len()];
+        Self { interval, cell, size, stride: [grid.size[0], grid.size[0] * grid.size[1]] }
+    }
+
+    /// The G-buffer's pixels, frame by frame, row by row.
+    fn pixels(&self, grid: &KeyGrid) -> impl Iterator<Item = usize> + use<> {
+        let [columns, rows] = grid.pixels(self.cell);
+        let [row, frame] = self.stride;
+        grid.frames_of(self.interval)
+            .flat_map(move |f| rows.clone().map(move |y| f as usize * frame + y * row))
+            .flat_map(move |start| columns.clone().map(move |x| start + x))
+    }
+
+    /// The steps from the pixel at `place` that stay inside: the tear that would stand in the way, and how far it is here and in the G-buffer.
+    fn steps(&self, place: usize) -> Vec<(u8, usize, usize)> {
+        let [width, height, frames] = self.size;
+        let (x, y, f) = (place % width, place / width % height, place / (width * height));
+        let mut steps = Vec::with_capacity(3);
+        if x + 1 < width {
+            steps.push((RIGHT, 1, 1));
+        }
+        if y + 1 < height {
+            steps.push((DOWN, width, self.stride[0]));
+        }
+        if f + 1 < frames {
+            steps.push((NEXT, width * height, self.stride[1]));
+        }
+        steps
+    }
+
+    /// Connected parts of each label; small ones are given up.
+    fn parts(&self, gbuffer: &GBuffer, tears: &[u8], grid: &KeyGrid, least: u32) -> Vec<u16> {
+        let pixels: Vec<usize> = self.pixels(grid).collect();
+        let mut parent: Vec<u16> = (0..pixels.len() as u16).collect();
+        fn root(parent: &mut [u16], mut at: u16) -> u16 {
+            while parent[usize::from(at)] != at {
+                parent[usize::from(at)] = parent[usize::from(parent[usize::from(at)])];
+                at = parent[usize::from(at)];
+            }
+            at
+        }
+        for (place, &pixel) in pixels.iter().enumerate() {
+            for (bit, near, far) in self.steps(place) {
+                if tears[pixel] & bit == 0 && gbuffer.label[pixel] == gbuffer.label[pixel + far] {
+                    let (a, b) = (root(&mut parent, place as u16), root(&mut parent, (place + near) as u16));
+                    parent[usize::from(a.max(b))] = a.min(b);
+                }
+            }
+        }
+        let roots: Vec<u16> = (0..pixels.len() as u16).map(|place| root(&mut parent, place)).collect();
+        let mut count = vec![0u32; pixels.len()];
+        for &root in &roots {
+            count[usize::from(root)] += 1;
+        }
+        roots.iter().map(|&root| if count[usize::from(root)] >= least { root } else { NONE }).collect()
+    }
+
+    /// Gives every part the number that most of its neighbours already have, to the left, above and before; parts of one label
+    /// in the cell get different ones.
+    fn adopt(&self, gbuffer: &GBuffer, tears: &[u8], grid: &KeyGrid, folding: &[bool], own: Option<&[u16]>, part: &mut [u8]) {
+        let pixels: Vec<usize> = self.pixels(grid).collect();
+        if !pixels.iter().any(|&pixel| folding[usize::from(gbuffer.label[pixel])]) {
+            return;
+        }
+        let [width, height, _] = self.size;
+        // Label and part here, pixels, votes.
+        let mut found: Vec<(u16, u16, u32, [u32; PARTS])> = Vec::new();
+        let key = |place: usize| (gbuffer.label[pixels[place]], own.map_or(0, |own| own[place]));
+        for (place, &pixel) in pixels.iter().enumerate() {
+            let (label, here) = key(place);
+            if here == NONE {
+                continue;
+            }
+            let at = found.iter().position(|&(l, p, ..)| (l, p) == (label, here)).unwrap_or_else(|| {
+                found.push((label, here, 0, [0; PARTS]));
+                found.len() - 1
+            });
+            found[at].2 += 1;
+            let (x, y, f) = (place % width, place / width % height, place / (width * height));
+            let mut ask = |edge: bool, back: usize, bit: u8| {
+                if let Some(other) = pixel.checked_sub(back).filter(|_| edge)
+                    && gbuffer.label[other] == label
+                    && tears[other] & bit == 0
+                    && usize::from(part[other]) < PARTS
+                {
+                    found[at].3[usize::from(part[other])] += 1;
+                }
+            };
+            let column = pixel % self.stride[0];
+            ask(x == 0 && column > 0, 1, RIGHT);
+            ask(y == 0 && pixel % self.stride[1] >= self.stride[0], self.stride[0], DOWN);
+            ask(f == 0, self.stride[1], NEXT);
+        }
+        // Those who are surest choose first; then the larger ones.
+        found.sort_by_key(|&(label, here, pixels, votes)| {
+            (std::cmp::Reverse(votes.iter().copied().max()), std::cmp::Reverse(pixels), label, here)
+        });
+        let mut chosen: Vec<((u16, u16), u8)> = Vec::new();
+        for &(label, here, _, votes) in &found {
+            let taken = |number: usize| chosen.iter().any(|&((l, _), n)| l == label && usize::from(n) == number);
+            let free = (0..PARTS).filter(|&number| !taken(number));
+            let number = free.max_by_key(|&number| (votes[number], std::cmp::Reverse(number)));
+            chosen.push(((label, here), number.map_or(u8::MAX, |number| number as u8)));
+        }
+        for (place, &pixel) in pixels.iter().enumerate() {
+            let (label, here) = key(place);
+            let number = chosen.iter().find(|&&(who, _)| who == (label, here)).map_or(u8::MAX, |&(_, number)| number);
+            part[pixel] = if folding[usize::from(label)] { number } else { 0 };
+        }
+    }
+}

@@ -1,0 +1,330 @@
+//! Inspection: what a bundle holds, byte by section.
+//! Bytes come from a file or the encoder; figures go to `cubist-bake inspect` and to the report's byte counts.
+
+use cubist_core::fixed::KEY_BITS;
+use cubist_core::format::{ATLAS, FIXED, INFO, LABELS, MASK, MASKED, PATH, STRIP, TIME_HOLD, TIME_LINEAR, VERSION};
+use cubist_core::{Bundle, BundleError};
+use serde::Serialize;
+
+/// A section as it stands in the bytes.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct SectionInfo {
+    /// Four letters.
+    pub tag: String,
+    /// What it holds.
+    pub holds: &'static str,
+    /// A player that does not know it refuses the bundle.
+    pub required: bool,
+    /// Where its value starts, bytes from the bundle's start.
+    pub offset: usize,
+    /// Length of its value.
+    pub bytes: usize,
+}
+
+/// A key.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct KeyInfo {
+    /// The frame it stands at.
+    pub frame: u32,
+    /// Decoding can start here.
+    pub independent: bool,
+    /// Bytes of its record.
+    pub bytes: usize,
+}
+
+/// A label.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct LabelInfo {
+    /// Left, top, right, bottom, texels; right and bottom exclusive.
+    pub rect: [u16; 4],
+    /// Its chart does not fill its rectangle.
+    pub masked: bool,
+    /// Its outline is told by two distances, from opposite sides, not by one.
+    pub strip: bool,
+    /// An affine function of the screen position: the background.
+    pub fixed: bool,
+    /// Where the screen's top left pixel centre falls, texels; for fixed labels.
+    pub origin: Option<[f64; 2]>,
+    /// Texels a pixel; for fixed labels.
+    pub step: Option<[f64; 2]>,
+}
+
+/// The path's header.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct PathInfo {
+    /// Width and height of the screen, pixels.
+    pub size: [u32; 2],
+    /// Frames.
+    pub frames: u32,
+    /// Frames per second.
+    pub fps: u16,
+    /// Frame 0 follows the last frame.
+    pub looping: bool,
+    /// Side of a cell, pixels.
+    pub cell: u32,
+    /// Columns and rows of cells.
+    pub cells: [u32; 2],
+    /// How layers move between keys.
+    pub time: &'static str,
+    /// Coordinates are coded in steps of one over this of a texel.
+    pub steps_a_texel: u32,
+    /// Bytes of the key table.
+    pub table_bytes: usize,
+    /// Bytes of the key records.
+    pub record_bytes: usize,
+}
+
+/// The source image's header.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct ImageInfo {
+    /// Texels a row and rows.
+    pub size: [u32; 2],
+    /// How texels are stored.
+    pub encoding: u8,
+    /// Palette entries.
+    pub colours: usize,
+    /// Texels that belong to a chart; `None`: no label is masked.
+    pub covered_texels: Option<u64>,
+}
+
+/// The bounds that a bundle states.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct LimitsInfo {
+    /// Layers in a key.
+    pub key_layers: u16,
+    /// Layers in a row of nodes.
+    pub row_layers: u16,
+    /// Bytes of an interval's sheet lists.
+    pub list_bytes: u16,
+    /// Sheets in a row of cells.
+    pub row_sheets: u16,
+    /// Sheets in a cell.
+    pub cell_sheets: u8,
+    /// Keys that one seek decodes.
+    pub seek_keys: u16,
+    /// Distances from outlines that a layer carries.
+    pub fields: u8,
+}
+
+/// Everything there is to say about a bundle without playing it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Inspection {
+    /// Version of the format.
+    pub version: u16,
+    /// Bytes of the whole bundle.
+    pub bytes: usize,
+    /// Bytes of magic, version, section headers and checksum.
+    pub envelope_bytes: usize,
+    /// The CRC-32 at the end.
+    pub checksum: String,
+    /// The sections, in the order of the bytes.
+    pub sections: Vec<SectionInfo>,
+    /// The path's header.
+    pub path: PathInfo,
+    /// The keys.
+    pub keys: Vec<KeyInfo>,
+    /// The source image's header.
+    pub image: ImageInfo,
+    /// The palette, "#rrggbb".
+    pub palette: Vec<String>,
+    /// The labels; label 0 is the background.
+    pub labels: Vec<LabelInfo>,
+    /// Working memory that a player asks for, bytes.
+    pub workspace: usize,
+    /// The stated bounds.
+    pub limits: LimitsInfo,
+    /// The text for people, if there is one.
+    pub info: Option<String>,
+}
+
+fn holds(tag: [u8; 4]) -> &'static str {
+    match tag {
+        PATH => "camera path: header, key table, key records",
+        ATLAS => "source image: palette, texels",
+        LABELS => "labels: a rectangle of the source image each",
+        MASK => "mask: one bit a texel, is it part of its chart",
+        INFO => "a text for people",
+        _ => "unknown to this version",
+    }
+}
+
+impl Inspection {
+    /// Takes a bundle apart.
+    ///
+    /// # Errors
+    /// [`BundleError`] where `bytes` are no bundle.
+    pub fn of(bytes: &[u8]) -> Result<Self, BundleError> {
+        let bundle = Bundle::parse(bytes)?;
+        let sections: Vec<SectionInfo> = bundle
+            .sections()
+            .map(|s| SectionInfo {
+                tag: String::from_utf8_lossy(&s.tag).into_owned(),
+                holds: holds(s.tag),
+                required: s.required,
+                // A section borrows from the bytes: its place in memory says its place in them.
+                offset: (s.bytes.as_ptr() as usize).saturating_sub(bytes.as_ptr() as usize),
+                bytes: s.bytes.len(),
+            })
+            .collect();
+        let find = |tag: [u8; 4]| bundle.sections().find(|s| s.tag == tag).map(|s| s.bytes);
+        let (path, atlas) = (bundle.path(), bundle.atlas());
+        let (width, height) = bundle.size();
+        let cell = 1u32 << path.cell_log2;
+        let masked = (0..bundle.label_count()).any(|label| bundle.label(label as u8).flags & MASKED != 0);
+        let covered = find(MASK).filter(|_| masked).map(|mask| mask.iter().map(|byte| u64::from(byte.count_ones())).sum());
+        let limits = bundle.limits();
+        Ok(Self {
+            version: VERSION,
+            bytes: bytes.len(),
+            envelope_bytes: bytes.len() - sections.iter().map(|s| s.bytes).sum::<usize>(),
+            checksum: format!("{:08x}", bytes.last_chunk::<4>().map_or(0, |crc| u32::from_le_bytes(*crc))),
+            sections,
+            path: PathInfo {
+                size: [width, height],
+                frames: bundle.frames(),
+                fps: bundle.fps(),
+                looping: bundle.looping(),
+                cell,
+                cells: [width.div_ceil(cell), height.div_ceil(cell)],
+                time: match path.time {
+                    TIME_HOLD => "hold",
+                    TIME_LINEAR => "linear",
+                    _ => "cubic",
+                },
+                steps_a_texel: (1 << KEY_BITS) >> path.step_log2,
+                table_bytes: path.table.len(),
+                record_bytes: path.records.len(),
+            },
+            keys: (0..bundle.key_count())
+                .map(|key| (bundle.key(key), bundle.record(key).len()))
+                .map(|(key, bytes)| KeyInfo { frame: key.frame, independent: key.independent, bytes })
+                .collect(),
+            image: ImageInfo {
+                size: [1 << atlas.width_log2, u32::from(atlas.height)],
+                encoding: atlas.encoding,
+                colours: atlas.palette.len() / 2,
+                covered_texels: covered,
+            },
+            palette: atlas.palette.as_chunks::<2>().0.iter().map(|&colour| hex(u16::from_le_bytes(colour))).collect(),
+            labels: (0..bundle.label_count()).map(|label| label_info(&bundle, label as u8)).collect(),
+            workspace: bundle.memory_needed(),
+            limits: LimitsInfo {
+                key_layers: limits.key_layers,
+                row_layers: limits.row_layers,
+                list_bytes: limits.list_bytes,
+                row_sheets: limits.row_sheets,
+                cell_sheets: limits.cell_sheets,
+                seek_keys: limits.seek_keys,
+                fields: limits.fields,
+            },
+            info: find(INFO).map(|text| String::from_utf8_lossy(text).into_owned()),
+        })
+    }
+
+    /// Bytes of the section `tag`; 0 where there is none.
+    #[must_use]
+    pub fn section_bytes(&self, tag: [u8; 4]) -> usize {
+        let tag = String::from_utf8_lossy(&tag);
+        self.sections.iter().filter(|s| s.tag == tag).map(|s| s.bytes).sum()
+    }
+
+    /// Bytes of the keys: their records and their table.
+    #[must_use]
+    pub fn key_bytes(&self) -> usize {
+        self.path.table_bytes + self.path.record_bytes
+    }
+
+    /// The inspection as lines of text.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut out = String::new();
+        let mut line = |text: String| {
+            out.push_str(text.trim_end());
+            out.push('\n');
+        };
+        let yes = |flag: bool| if flag { "yes" } else { "no" };
+        line(format!("Cubist bundle, format version {}, {} bytes, checksum {}", self.version, self.bytes, self.checksum));
+        if let Some(info) = &self.info {
+            line(format!("  about  {}", info.escape_debug()));
+        }
+        line(String::new());
+        line(format!("{:>8} {:>9}  {:7}  holds", "offset", "bytes", "section"));
+        for s in &self.sections {
+            let note = if s.required { "" } else { " (a player may skip it)" };
+            line(format!("{:>8} {:>9}  {:7}  {}{note}", s.offset, s.bytes, s.tag.escape_debug(), s.holds));
+        }
+        line(format!("{:>8} {:>9}  {:7}  magic, version, section headers, checksum", "", self.envelope_bytes, ""));
+        line(String::new());
+        let (p, [width, height]) = (&self.path, self.path.size);
+        line(format!("PATH  {} frames of {width} x {height} at {} frames/s, looping: {}", p.frames, p.fps, yes(p.looping)));
+        line(format!(
+            "      grid: {} x {} cells of {} pixels; time: {}; coordinates in 1/{} texel",
+            p.cells[0], p.cells[1], p.cell, p.time, p.steps_a_texel
+        ));
+        line(format!(
+            "      keys: {}, table {} bytes, records {} bytes, {:.1} bytes a frame",
+            self.keys.len(),
+            p.table_bytes,
+            p.record_bytes,
+            self.key_bytes() as f64 / f64::from(p.frames)
+        ));
+        for (index, key) in self.keys.iter().enumerate() {
+            line(format!(
+                "      key {index:>4} at frame {:>5} {:>8} bytes{}",
+                key.frame,
+                key.bytes,
+                if key.independent { "  independent" } else { "" }
+            ));
+        }
+        let image = &self.image;
+        let covered = image
+            .covered_texels
+            .map_or_else(|| "all".to_owned(), |n| format!("{n}, {:.1} %", 100.0 * n as f64 / f64::from(image.size[0] * image.size[1])));
+        line(format!(
+            "ATLS  {} x {} texels, encoding {}, {} colours; covered: {covered}",
+            image.size[0], image.size[1], image.encoding, image.colours
+        ));
+        for (index, row) in self.palette.chunks(12).enumerate() {
+            line(format!("      colours from {:>3}  {}", index * 12, row.join(" ")));
+        }
+        line(format!("LABL  {} labels", self.labels.len()));
+        for (index, label) in self.labels.iter().enumerate() {
+            let [x0, y0, x1, y1] = label.rect;
+            let fixed = match (label.origin, label.step) {
+                (Some([u, v]), Some([du, dv])) => format!("  fixed to the screen: ({u:.3}, {v:.3}) + ({du:.5}, {dv:.5}) a pixel"),
+                _ => String::new(),
+            };
+            line(format!(
+                "      label {index:>3}  {x0:>4}..{x1:<4} x {y0:>4}..{y1:<4}{}{}{fixed}",
+                if label.masked { "  masked" } else { "" },
+                if label.strip { "  strip" } else { "" }
+            ));
+        }
+        let l = &self.limits;
+        line(format!("Memory  {} bytes of working memory and a row of {} bytes", self.workspace, width * 2));
+        line(format!(
+            "Limits  a key: {} layers, {} bytes of sheet lists; a row: {} layers, {} sheets; a cell: {} sheets; a layer: {} fields; a seek: {} keys",
+            l.key_layers, l.list_bytes, l.row_layers, l.row_sheets, l.cell_sheets, l.fields, l.seek_keys
+        ));
+        out
+    }
+}
+
+fn hex(colour: u16) -> String {
+    let [r, g, b] = crate::verify::rgb(colour);
+    format!("#{r:02x}{g:02x}{b:02x}")
+}
+
+fn label_info(bundle: &Bundle<'_>, label: u8) -> LabelInfo {
+    let record = bundle.label(label);
+    let fixed = record.flags & FIXED != 0;
+    let scaled = |value: u16, bits: u32| f64::from(value) / f64::from(1u32 << bits);
+    LabelInfo {
+        rect: [record.left, record.top, record.right, record.bottom],
+        masked: record.flags & MASKED != 0,
+        strip: record.flags & STRIP != 0,
+        fixed,
+        origin: fixed.then(|| [scaled(record.origin_u, KEY_BITS), scaled(record.origin_v, KEY_BITS)]),
+        step: fixed.then(|| [scaled(record.step_u, 14), scaled(record.step_v, 14)]),
+    }
+}

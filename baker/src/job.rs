@@ -1,0 +1,167 @@
+//! A whole job: a scene and what the user asks of its bundle in; the bundle, verified, and its report out.
+//! The stages are `bake`'s, the search is `tune`'s, the figures are `verify`'s.
+
+use crate::atlas;
+use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings};
+use crate::inspect::Inspection;
+use crate::report::{Origin, Report, Seconds};
+use crate::scene::Scene;
+use crate::truth::{Truth, spread};
+use crate::{tune, verify};
+use std::time::Instant;
+
+/// Screens wider than this get cells of 16 pixels unless told otherwise.
+const WIDE: u32 = 640;
+
+/// What the bundle is to reach.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Goal {
+    /// What the settings give.
+    #[default]
+    AsSet,
+    /// At most this many bytes, at the best quality that fits.
+    Budget(u64),
+    /// The fewest bytes with at least this mean PSNR, dB, against exact ray casting.
+    Psnr(f64),
+}
+
+/// The frames to compare with the antialiased scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TruthFrames {
+    /// None.
+    None,
+    /// At most this many, evenly spread.
+    Most(u32),
+    /// All.
+    All,
+}
+
+/// What the user asks of a bundle.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Side of a cell, pixels; `None`: the baker chooses.
+    pub cell: Option<u32>,
+    /// Frames between keys; `None`: the baker chooses.
+    pub key_interval: Option<u32>,
+    /// The source image; a search may make it coarser.
+    pub source: atlas::Settings,
+    /// Every this many keys one that needs no earlier one.
+    pub independent_every: usize,
+    /// What to reach.
+    pub goal: Goal,
+    /// How much is compared with the truth.
+    pub truth: TruthFrames,
+    /// Seconds that reading the scene took, for the report.
+    pub load_seconds: f64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            cell: None,
+            key_interval: None,
+            source: atlas::Settings::default(),
+            independent_every: Settings::default().coding.independent_every,
+            goal: Goal::AsSet,
+            truth: TruthFrames::Most(16),
+            load_seconds: 0.0,
+        }
+    }
+}
+
+impl Options {
+    /// The settings for a screen `width` pixels wide, the baker's choices filled in.
+    #[must_use]
+    pub fn settings(&self, width: u32) -> Settings {
+        let mut settings = Settings { atlas: self.source, ..Settings::default() };
+        settings.coding.independent_every = self.independent_every;
+        settings.cell = self.cell.unwrap_or(if width > WIDE { 16 } else { settings.cell });
+        settings.key_interval = self.key_interval.unwrap_or(settings.key_interval);
+        settings
+    }
+}
+
+/// A finished job.
+pub struct Baked {
+    /// The bundle's bytes.
+    pub bundle: Vec<u8>,
+    /// What they cost and reach.
+    pub report: Report,
+    /// The source image and the G-buffer they came from.
+    pub flat: Flat,
+}
+
+/// What was chosen: by the settings or by a search.
+pub(crate) struct Chosen {
+    pub flat: Flat,
+    pub encoded: Encoded,
+    pub settings: Settings,
+    /// Seconds for what was tried and not kept.
+    pub search_seconds: f64,
+    /// What the user should know about the choice.
+    pub warnings: Vec<String>,
+}
+
+/// Bakes a scene, verifies the bundle and reports; `progress` hears the stages.
+///
+/// # Errors
+/// [`BakeError`] where settings are out of range, the camera sees nothing, the scene exceeds what a bundle holds, or the
+/// goal is out of reach.
+pub fn bake_scene(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<(Vec<u8>, Report), BakeError> {
+    run(scene, options, progress).map(|baked| (baked.bundle, baked.report))
+}
+
+/// Like [`bake_scene`], but hands out the source image and the G-buffer as well.
+///
+/// # Errors
+/// The same.
+pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<Baked, BakeError> {
+    let start = Instant::now();
+    let settings = options.settings(scene.playback.width);
+    let Chosen { flat, encoded, settings, search_seconds, warnings } = match options.goal {
+        Goal::AsSet => {
+            let flat = bake::flatten(scene, &settings.atlas, progress)?;
+            something_seen(&flat)?;
+            let encoded = bake::encode(scene, &flat, &settings, progress)?;
+            Chosen { flat, encoded, settings, search_seconds: 0.0, warnings: Vec::new() }
+        }
+        goal => tune::search(scene, options, goal, progress)?,
+    };
+    let verify_start = Instant::now();
+    let part = |done: u32, total: u32| f64::from(done) / f64::from(total.max(1));
+    progress("comparing with exact rays", 0.0);
+    let inspection = Inspection::of(&encoded.bundle).map_err(verify::VerifyError::from)?;
+    let quality = verify::against_exact(&encoded.bundle, &flat.atlas, &|d, n| progress("comparing with exact rays", part(d, n)))?;
+    let work = verify::work(&encoded.bundle)?;
+    let frames = match options.truth {
+        TruthFrames::None => Vec::new(),
+        TruthFrames::Most(most) => spread(scene.playback.frames, most),
+        TruthFrames::All => spread(scene.playback.frames, scene.playback.frames),
+    };
+    let truth = if frames.is_empty() {
+        None
+    } else {
+        progress("comparing with the truth", 0.0);
+        let truth = Truth::new(scene);
+        let bar = |d, n| progress("comparing with the truth", part(d, n));
+        Some(verify::against_truth(&encoded.bundle, &truth, &frames, &bar)?)
+    };
+    let seconds = Seconds {
+        total: options.load_seconds + start.elapsed().as_secs_f64(),
+        load: options.load_seconds,
+        atlas: flat.atlas_seconds,
+        rays: flat.ray_seconds,
+        encode: encoded.seconds,
+        verify: verify_start.elapsed().as_secs_f64(),
+        search: search_seconds,
+    };
+    let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings };
+    let mut report = Report::new(&origin, &inspection, quality, truth, work, seconds);
+    report.warnings.extend(warnings);
+    Ok(Baked { bundle: encoded.bundle, report, flat })
+}
+
+/// Refuses a path that shows nothing but background.
+pub(crate) fn something_seen(flat: &Flat) -> Result<(), BakeError> {
+    if flat.atlas.gbuffer.label.iter().all(|&label| label == 0) { Err(BakeError::Nothing { rays: flat.rays }) } else { Ok(()) }
+}

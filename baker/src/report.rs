@@ -1,0 +1,329 @@
+//! The report: what a bake cost and what it reached, for people and scripts.
+//! Figures come from the finished bytes through [`Inspection`] and `verify`; JSON and table rows go out.
+
+use crate::bake::{Encoded, Flat, Settings};
+use crate::inspect::Inspection;
+use crate::scene::Scene;
+use crate::verify::{Quality, TruthQuality, Work};
+use cubist_core::format::{ATLAS, LABELS, MASK};
+use serde::{Deserialize, Serialize};
+
+/// Below this share of the resolution asked for, the source image is called too small.
+const COARSE: f64 = 0.7;
+/// From this share of pixels on, %, left-out surfaces are worth a warning.
+const DROPPED_PERCENT: f64 = 0.01;
+
+/// Seconds by stage, wall clock.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Seconds {
+    /// Everything.
+    pub total: f64,
+    /// Reading the scene.
+    pub load: f64,
+    /// Charts and source image.
+    pub atlas: f64,
+    /// Casting rays.
+    pub rays: f64,
+    /// Sheets, fit, order, coding.
+    pub encode: f64,
+    /// Playing and comparing.
+    pub verify: f64,
+    /// Bakes that a search tried and did not keep.
+    pub search: f64,
+}
+
+/// The key-ray grid.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Grid {
+    /// Side of a cell, pixels.
+    pub cell: u32,
+    /// Frames between keys.
+    pub key_interval: u32,
+    /// Keys.
+    pub keys: usize,
+}
+
+/// Bytes by section; `bundle` is the sum of `atlas`, `labels`, `mask`, `keys` and `other`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Bytes {
+    /// The whole bundle.
+    pub bundle: usize,
+    /// The source image with its palette.
+    pub atlas: usize,
+    /// The labels.
+    pub labels: usize,
+    /// The mask.
+    pub mask: usize,
+    /// The key records and their table.
+    pub keys: usize,
+    /// Headers, limits, checksum, a text for people.
+    pub other: usize,
+    /// `keys` over frames.
+    pub keys_per_frame: f64,
+    /// `bundle` over frames.
+    pub per_frame: f64,
+}
+
+/// Bytes of memory that playing takes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Memory {
+    /// What [`cubist_core::Player::new`] asks for.
+    pub workspace: usize,
+    /// A row of pixels.
+    pub row: usize,
+}
+
+/// The source image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Source {
+    /// Texels a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Palette entries.
+    pub colours: usize,
+    /// Connected regions.
+    pub charts: usize,
+    /// Labels, the background included.
+    pub labels: usize,
+    /// Share of texels covered, 0..=1.
+    pub fill: f64,
+    /// Texels a pixel that were asked for where a surface is seen closest.
+    pub density: f64,
+    /// What densities were multiplied by to make everything fit; at most 1.
+    pub scale: f64,
+}
+
+/// The report; its keys keep their names and meaning.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Report {
+    /// What the scene is called.
+    pub scene: String,
+    /// Width and height of the screen, pixels.
+    pub size: [u32; 2],
+    /// Frames.
+    pub frames: u32,
+    /// Frames per second.
+    pub fps: u16,
+    /// Frame 0 follows the last frame.
+    pub looping: bool,
+    /// Triangles of the scene.
+    pub triangles: usize,
+    /// Rays cast for the G-buffer.
+    pub rays: u64,
+    /// Seconds by stage.
+    pub seconds: Seconds,
+    /// The key-ray grid.
+    pub grid: Grid,
+    /// The source image.
+    pub source_image: Source,
+    /// Bytes by section.
+    pub bytes: Bytes,
+    /// Memory for playing.
+    pub memory: Memory,
+    /// Playback against exact ray casting through the same source image.
+    pub quality: Quality,
+    /// Playback against the antialiased scene; `None` (null) where it was not asked for.
+    pub quality_vs_truth: Option<TruthQuality>,
+    /// Work per frame.
+    pub work: Work,
+    /// What the player does beyond looking up texels.
+    pub effects: Vec<String>,
+    /// What the user should know.
+    pub warnings: Vec<String>,
+}
+
+/// Where a bundle comes from.
+pub(crate) struct Origin<'a> {
+    pub scene: &'a Scene,
+    pub flat: &'a Flat,
+    pub encoded: &'a Encoded,
+    pub settings: &'a Settings,
+}
+
+impl Report {
+    /// Puts the report together; bytes are counted in the bundle itself, as `inspection` found them.
+    pub(crate) fn new(
+        origin: &Origin<'_>,
+        inspection: &Inspection,
+        quality: Quality,
+        truth: Option<TruthQuality>,
+        work: Work,
+        seconds: Seconds,
+    ) -> Self {
+        let Origin { scene, flat, encoded, settings } = origin;
+        let play = &scene.playback;
+        let frames = f64::from(play.frames.max(1));
+        let (atlas, labels, mask) = (inspection.section_bytes(ATLAS), inspection.section_bytes(LABELS), inspection.section_bytes(MASK));
+        let keys = inspection.key_bytes();
+        let (image, figures) = (&flat.atlas.image, &flat.atlas.figures);
+        Self {
+            scene: scene.name.clone(),
+            size: [play.width, play.height],
+            frames: play.frames,
+            fps: play.fps,
+            looping: play.looping,
+            triangles: scene.triangles.len(),
+            rays: flat.rays,
+            seconds,
+            grid: Grid { cell: settings.cell, key_interval: settings.key_interval, keys: encoded.grid.keys.len() },
+            source_image: Source {
+                width: image.width,
+                height: image.height,
+                colours: image.palette.len(),
+                charts: figures.charts,
+                labels: figures.labels,
+                fill: figures.fill,
+                density: settings.atlas.density,
+                scale: figures.scale,
+            },
+            bytes: Bytes {
+                bundle: inspection.bytes,
+                atlas,
+                labels,
+                mask,
+                keys,
+                other: inspection.bytes - atlas - labels - mask - keys,
+                keys_per_frame: keys as f64 / frames,
+                per_frame: inspection.bytes as f64 / frames,
+            },
+            memory: Memory { workspace: inspection.workspace, row: play.width as usize * 2 },
+            quality,
+            quality_vs_truth: truth,
+            work,
+            effects: vec!["palette".to_owned()],
+            warnings: scene.warnings.iter().cloned().chain(warnings(origin)).collect(),
+        }
+    }
+
+    /// The report as one JSON document.
+    #[must_use]
+    pub fn json(&self) -> String {
+        serde_json::to_string_pretty(self).unwrap_or_else(|error| unreachable!("numbers, strings and lists always serialise: {error}"))
+    }
+}
+
+/// What the pipeline itself warns of.
+fn warnings(origin: &Origin<'_>) -> Vec<String> {
+    let Origin { scene, flat, encoded, settings } = origin;
+    let figures = &flat.atlas.figures;
+    let mut out = Vec::new();
+    let dropped = 100.0 * encoded.dropped_pixels as f64 / flat.rays.max(1) as f64;
+    if dropped > DROPPED_PERCENT {
+        out.push(format!(
+            "{dropped:.2} % of the pixels show a surface too small for its cell of {0} x {0} pixels x {1} frames; they show a neighbour instead; smaller cells (--cell) keep them",
+            settings.cell, settings.key_interval
+        ));
+    }
+    if figures.scale < COARSE {
+        let cure = if settings.atlas.max_side < 1024 {
+            format!("raise --atlas above {}", settings.atlas.max_side)
+        } else {
+            "shorten the path or lower --size".to_owned()
+        };
+        out.push(format!(
+            "the source image holds {:.0} % of the resolution asked for, {:.2} texels a pixel at the closest view; {cure}",
+            100.0 * figures.scale,
+            figures.scale * settings.atlas.density
+        ));
+    }
+    if figures.charts + 1 > figures.labels {
+        out.push(format!(
+            "{} charts share {} labels: charts that are never seen near each other have one in common",
+            figures.charts,
+            figures.labels - 1
+        ));
+    }
+    if scene.playback.looping && scene.playback.frames == 1 {
+        out.push("a looping path of one frame shows a single picture".to_owned());
+    }
+    out
+}
+
+/// A number with its thousands apart: 12,345.
+#[must_use]
+pub fn grouped(number: usize) -> String {
+    let digits = number.to_string();
+    let mut out = String::with_capacity(digits.len() + digits.len() / 3);
+    for (at, digit) in digits.chars().enumerate() {
+        if at > 0 && (digits.len() - at).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(digit);
+    }
+    out
+}
+
+/// The report as rows of name and value: bytes by section, quality, memory, seconds.
+#[must_use]
+pub fn table(report: &Report) -> Vec<(String, String)> {
+    let Report { bytes, quality, source_image: image, seconds, grid, work, .. } = report;
+    let mut rows = Vec::new();
+    let mut row = |name: &str, value: String| rows.push((name.to_owned(), value));
+    let [width, height] = report.size;
+    let looping = if report.looping { ", looping" } else { "" };
+    row("scene", format!("{}: {} triangles, {} rays", report.scene, grouped(report.triangles), grouped(report.rays as usize)));
+    row("playback", format!("{} frames of {width} x {height}, {} frames/s{looping}", report.frames, report.fps));
+    row("grid", format!("{} keys, one every {} frames; cells of {} pixels", grid.keys, grid.key_interval, grid.cell));
+    row(
+        "source image",
+        format!(
+            "{} bytes: {} x {} texels, {} colours, {:.0} % covered",
+            grouped(bytes.atlas),
+            image.width,
+            image.height,
+            image.colours,
+            100.0 * image.fill
+        ),
+    );
+    row("labels, mask", format!("{} bytes: {} labels for {} charts", grouped(bytes.labels + bytes.mask), image.labels, image.charts));
+    row("keys", format!("{} bytes: {:.1} a frame", grouped(bytes.keys), bytes.keys_per_frame));
+    row("bundle", format!("{} bytes: {:.1} a frame", grouped(bytes.bundle), bytes.per_frame));
+    row(
+        "PSNR",
+        format!(
+            "{:.2} dB mean, {:.2} dB at worst (frame {}); bilinear {:.2} dB",
+            quality.psnr_mean, quality.psnr_min, quality.worst_frame, quality.psnr_bilinear
+        ),
+    );
+    row("SSIM", format!("{:.4}", quality.ssim_mean));
+    row("wrong surface", format!("{:.3} % of the pixels", quality.wrong_surface_percent));
+    let path = &quality.path_error_texels;
+    row("path error", format!("{:.2} texels median, {:.2} for 99 %, {:.1} worst", path.p50, path.p99, path.max));
+    if let Some(truth) = &report.quality_vs_truth {
+        let of = if truth.truth_frames == report.frames { "all".to_owned() } else { truth.truth_frames.to_string() };
+        row("against truth", format!("{:.2} dB, SSIM {:.4}, over {of} frames", truth.psnr_mean, truth.ssim_mean));
+    }
+    row(
+        "torn",
+        format!(
+            "{:.1} % of the pixels; {:.0} coverage tests a frame, {} at most",
+            work.torn_percent,
+            work.coverage_tests_mean,
+            grouped(work.coverage_tests_worst as usize)
+        ),
+    );
+    row("working memory", format!("{} bytes and a row of {}", grouped(report.memory.workspace), grouped(report.memory.row)));
+    row("speed here", format!("{:.0} frames/s on one thread", work.host_frames_per_second));
+    let search = if seconds.search > 0.0 { format!(", search {:.1}", seconds.search) } else { String::new() };
+    row(
+        "seconds",
+        format!(
+            "{:.1}: load {:.1}, rays {:.1}, atlas {:.1}, encode {:.1}, verify {:.1}{search}",
+            seconds.total, seconds.load, seconds.rays, seconds.atlas, seconds.encode, seconds.verify
+        ),
+    );
+    rows
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thousands_stand_apart() {
+        for (number, text) in [(0, "0"), (999, "999"), (1000, "1,000"), (1_234_567, "1,234,567")] {
+            assert_eq!(grouped(number), text);
+        }
+    }
+}

@@ -1,0 +1,406 @@
+//! Tuning: the bundle that fits a budget at the best quality, or that reaches a quality at the fewest bytes.
+//! A scene and a goal come from `job`; the winner goes back there. Rays are cast once; whatever is tried is baked, played
+//! and measured. What is tried, and in which order, depends on nothing but the scene and the options.
+
+use crate::atlas::{self, Atlas};
+use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings};
+use crate::gbuffer::Hits;
+use crate::job::{self, Chosen, Goal, Options};
+use crate::metrics;
+use crate::scene::Scene;
+use crate::tears;
+use crate::trace::Tracer;
+use crate::truth::Truth;
+use crate::verify;
+use std::time::Instant;
+
+/// Cells tried, pixels.
+const CELLS: [u32; 2] = [16, 8];
+/// Cells tried when the others do not reach a quality: they take four times the memory.
+const FINE_CELLS: [u32; 1] = [4];
+/// Key intervals tried, frames.
+const INTERVALS: [u32; 4] = [32, 16, 8, 4];
+/// What a bit is worth, coarsest first, in the search for a budget.
+const BUDGET_LAMBDAS: [f32; 2] = [0.3, 0.05];
+/// What a bit is worth, coarsest first, in the search for a quality, once the grid is found.
+const QUALITY_LAMBDAS: [f32; 3] = [1.0, 0.3, 0.1];
+/// What a bit is worth when a quality is just missed.
+const FINEST_LAMBDA: f32 = 0.01;
+/// Densities of the source image tried, of the one asked for.
+const DENSITIES: [f64; 9] = [1.0, 0.85, 0.7, 0.6, 0.5, 0.35, 0.25, 0.18, 0.125];
+/// Frames compared with the truth while searching.
+const SAMPLES: u32 = 12;
+/// Bundles that fit the budget and are measured.
+const TRIES: usize = 6;
+/// How far a predicted size may lie over the budget and still be tried.
+const SLACK: f64 = 1.05;
+
+/// Searches for `goal`.
+///
+/// # Errors
+/// [`BakeError::Budget`] or [`BakeError::Psnr`] where nothing reaches the goal, with the nearest that can be; whatever
+/// flattening and encoding say.
+pub(crate) fn search(scene: &Scene, options: &Options, goal: Goal, progress: Progress<'_>) -> Result<Chosen, BakeError> {
+    let start = Instant::now();
+    progress("building the hierarchy", 0.0);
+    let tracer = Tracer::new(scene);
+    let hits = Hits::cast(scene, &tracer, &|done, total| progress("casting rays", done as f64 / total.max(1) as f64));
+    let search = Search { scene, options, tracer, hits, ray_seconds: start.elapsed().as_secs_f64(), progress };
+    let mut chosen = match goal {
+        Goal::Budget(budget) => search.budget(budget)?,
+        Goal::Psnr(asked) => search.psnr(asked)?,
+        Goal::AsSet => {
+            let settings = options.settings(scene.playback.width);
+            let flat = search.flat(settings.atlas)?;
+            search.finish(flat, settings, Vec::new())?
+        }
+    };
+    let kept = chosen.flat.ray_seconds + chosen.flat.atlas_seconds + chosen.encoded.seconds;
+    chosen.search_seconds = (start.elapsed().as_secs_f64() - kept).max(0.0);
+    Ok(chosen)
+}
+
+struct Search<'a> {
+    scene: &'a Scene,
+    options: &'a Options,
+    tracer: Tracer<'a>,
+    hits: Hits,
+    ray_seconds: f64,
+    progress: Progress<'a>,
+}
+
+/// A source image, measured.
+struct Image {
+    source: atlas::Settings,
+    bytes: usize,
+    /// Mean squared error of exact rays through it against the truth.
+    error: f64,
+}
+
+/// A way to code keys, measured at one source image.
+#[derive(Clone, Copy)]
+struct Keys {
+    settings: Settings,
+    bytes: usize,
+    /// What playback adds to the mean squared error against the truth.
+    error: f64,
+}
+
+impl Search<'_> {
+    fn flat(&self, source: atlas::Settings) -> Result<Flat, BakeError> {
+        let start = Instant::now();
+        let atlas = atlas::build(self.scene, &self.hits, &source, &|_, _| {})?;
+        let flat = Flat {
+            tears: tears::find(self.scene, &self.tracer, &self.hits, &atlas.gbuffer),
+            atlas,
+            rays: self.hits.samples.len() as u64,
+            ray_seconds: self.ray_seconds,
+            atlas_seconds: start.elapsed().as_secs_f64(),
+        };
+        job::something_seen(&flat)?;
+        Ok(flat)
+    }
+
+    fn encode(&self, flat: &Flat, settings: &Settings) -> Result<Encoded, BakeError> {
+        bake::encode(self.scene, flat, settings, &|_, _| {})
+    }
+
+    fn finish(&self, flat: Flat, settings: Settings, warnings: Vec<String>) -> Result<Chosen, BakeError> {
+        let encoded = self.encode(&flat, &settings)?;
+        Ok(Chosen { flat, encoded, settings, search_seconds: 0.0, warnings })
+    }
+
+    /// The grids to try, the coarsest first.
+    fn grids(&self, source: atlas::Settings, cells: &[u32]) -> Vec<Settings> {
+        let base = Settings { atlas: source, ..self.options.settings(self.scene.playback.width) };
+        let cells = self.options.cell.map_or(cells.to_vec(), |cell| vec![cell]);
+        let shorter: Vec<u32> = INTERVALS.into_iter().filter(|&interval| interval < self.scene.playback.frames).collect();
+        let intervals = match self.options.key_interval {
+            Some(interval) => vec![interval],
+            None if shorter.is_empty() => vec![base.key_interval],
+            None => shorter,
+        };
+        let each = |cell: u32| intervals.iter().map(move |&key_interval| Settings { cell, key_interval, ..base });
+        cells.iter().flat_map(|&cell| each(cell)).collect()
+    }
+
+    fn say(&self, done: usize, of: usize) {
+        (self.progress)("searching", done as f64 / of.max(1) as f64);
+    }
+
+    /// The best bundle of at most `budget` bytes.
+    ///
+    /// Source images and grids are measured apart, then the sums of their bytes and of their errors say which pairs to bake.
+    fn budget(&self, budget: u64) -> Result<Chosen, BakeError> {
+        let steps = DENSITIES.len() + INTERVALS.len() * CELLS.len() * BUDGET_LAMBDAS.len() + TRIES;
+        let samples = Samples::new(self.scene);
+        let room = usize::try_from(budget).unwrap_or(usize::MAX);
+        let mut images: Vec<Image> = Vec::new();
+        let mut reference: Option<Flat> = None;
+        let mut asked = self.options.source;
+        for (step, ratio) in DENSITIES.into_iter().enumerate() {
+            self.say(step, steps);
+            let source = atlas::Settings { density: asked.density * ratio, ..asked };
+            if let Some(last) = images.last()
+                && last.bytes as f64 * (source.density / last.source.density).powi(2) > 1.5 * room as f64
+                && step + 1 < DENSITIES.len()
+            {
+                continue;
+            }
+            let flat = self.flat(source)?;
+            if step == 0 {
+                // Where the image is full, densities above what it holds change nothing.
+                asked.density *= flat.atlas.figures.scale;
+            }
+            let image = Image { source, bytes: image_bytes(&flat.atlas), error: samples.of_image(&flat.atlas) };
+            if reference.is_none() && (image.bytes < room / 10 * 9 || step + 1 == DENSITIES.len()) {
+                reference = Some(flat);
+            }
+            images.push(image);
+        }
+        let Some(flat) = reference else { return Err(BakeError::Budget { budget, smallest: u64::MAX }) };
+        let keys = self.keys(&flat, &samples, steps)?;
+        drop(flat);
+        let mut pairs: Vec<(&Image, &Keys)> = images.iter().flat_map(|image| keys.iter().map(move |keys| (image, keys))).collect();
+        pairs.sort_by(|a, b| {
+            let error = |(image, keys): &(&Image, &Keys)| image.error + keys.error;
+            error(a).total_cmp(&error(b)).then((a.0.bytes + a.1.bytes).cmp(&(b.0.bytes + b.1.bytes)))
+        });
+        self.best_pair(budget, &pairs, &samples, steps)
+    }
+
+    /// Measures every way to code keys at one source image.
+    fn keys(&self, flat: &Flat, samples: &Samples, steps: usize) -> Result<Vec<Keys>, BakeError> {
+        let (image_bytes, image_error) = (image_bytes(&flat.atlas), samples.of_image(&flat.atlas));
+        let mut keys = Vec::new();
+        for grid in self.grids(self.options.source, &CELLS) {
+            for lambda in BUDGET_LAMBDAS {
+                self.say(DENSITIES.len() + keys.len(), steps);
+                let mut settings = grid;
+                settings.coding.lambda = lambda;
+                let bundle = self.encode(flat, &settings)?.bundle;
+                let (error, _) = samples.of_bundle(&bundle)?;
+                keys.push(Keys { settings, bytes: bundle.len().saturating_sub(image_bytes), error: (error - image_error).max(0.0) });
+            }
+        }
+        Ok(keys)
+    }
+
+    /// Bakes the pairs that promise most until enough of them fit, and keeps the best.
+    fn best_pair(&self, budget: u64, pairs: &[(&Image, &Keys)], samples: &Samples, steps: usize) -> Result<Chosen, BakeError> {
+        let mut current: Option<(f64, Flat)> = None;
+        let mut best: Option<(f64, Settings)> = None;
+        let (mut fitting, mut smallest) = (0, u64::MAX);
+        // Where nothing is predicted to fit, the smallest prediction is tried all the same.
+        let least = pairs.iter().map(|(image, keys)| image.bytes + keys.bytes).min().unwrap_or(0);
+        for (image, keys) in pairs {
+            let predicted = image.bytes + keys.bytes;
+            if fitting == TRIES || (predicted as f64 > budget as f64 * SLACK && predicted > least) {
+                continue;
+            }
+            self.say(steps - TRIES + fitting, steps);
+            let flat = match current.take() {
+                Some((density, flat)) if density == image.source.density => flat,
+                _ => self.flat(image.source)?,
+            };
+            let settings = Settings { atlas: image.source, ..keys.settings };
+            let bundle = self.encode(&flat, &settings)?.bundle;
+            smallest = smallest.min(bundle.len() as u64);
+            if bundle.len() as u64 <= budget {
+                fitting += 1;
+                let (_, psnr) = samples.of_bundle(&bundle)?;
+                if best.is_none_or(|(most, _)| psnr > most) {
+                    best = Some((psnr, settings));
+                }
+            }
+            current = Some((image.source.density, flat));
+        }
+        let Some((_, settings)) = best else { return Err(BakeError::Budget { budget, smallest }) };
+        let flat = match current {
+            Some((density, flat)) if density == settings.atlas.density => flat,
+            _ => self.flat(settings.atlas)?,
+        };
+        self.finish(flat, settings, Vec::new())
+    }
+
+    /// The smallest bundle whose mean PSNR against exact rays reaches `asked`.
+    fn psnr(&self, asked: f64) -> Result<Chosen, BakeError> {
+        let mut nearest = 0.0f64;
+        let mut source = self.options.source;
+        let steps = CELLS.len() * INTERVALS.len() + QUALITY_LAMBDAS.len();
+        for (step, ratio) in DENSITIES.into_iter().enumerate() {
+            if step > 0 && ratio > 0.8 {
+                continue;
+            }
+            let wanted = atlas::Settings { density: source.density * ratio, ..source };
+            let flat = self.flat(wanted)?;
+            if step == 0 {
+                source.density *= flat.atlas.figures.scale;
+            }
+            let found = match self.smallest(&flat, wanted, &CELLS, asked, steps, &mut nearest)? {
+                None if self.options.cell.is_none() => self.smallest(&flat, wanted, &FINE_CELLS, asked, steps, &mut nearest)?,
+                found => found,
+            };
+            if let Some(settings) = found {
+                let coarser = (step > 0).then(|| {
+                    format!(
+                        "--psnr {asked}: out of reach at a density of {:.2} texels a pixel: the source image has {:.2}, which shows less detail",
+                        source.density, wanted.density
+                    )
+                });
+                return self.finish(flat, settings, coarser.into_iter().collect());
+            }
+        }
+        Err(BakeError::Psnr { asked, nearest })
+    }
+
+    /// The settings of the smallest bundle that reaches `asked` at one source image; `nearest` is raised to what is reached.
+    fn smallest(
+        &self,
+        flat: &Flat,
+        source: atlas::Settings,
+        cells: &[u32],
+        asked: f64,
+        steps: usize,
+        nearest: &mut f64,
+    ) -> Result<Option<Settings>, BakeError> {
+        let mut measure = |settings: &Settings| -> Result<(usize, f64), BakeError> {
+            let bundle = self.encode(flat, settings)?.bundle;
+            let psnr = verify::against_exact(&bundle, &flat.atlas, &|_, _| {})?.psnr_mean;
+            *nearest = nearest.max(psnr);
+            Ok((bundle.len(), psnr))
+        };
+        let mut measured: Vec<(usize, f64, Settings)> = Vec::new();
+        for (step, settings) in self.grids(source, cells).into_iter().enumerate() {
+            self.say(step, steps);
+            let (bytes, psnr) = measure(&settings)?;
+            measured.push((bytes, psnr, settings));
+        }
+        let reaching = measured.iter().filter(|(_, psnr, _)| *psnr >= asked).min_by_key(|(bytes, ..)| *bytes);
+        let Some(&(bytes, _, grid)) = reaching else {
+            // Just missed: the grid that comes closest, without any saving on ghosts and with all bits of the coordinates.
+            let Some(&(.., mut grid)) = measured.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else { return Ok(None) };
+            (grid.coding.lambda, grid.coding.step_log2) = (FINEST_LAMBDA, 0);
+            return Ok((measure(&grid)?.1 >= asked).then_some(grid));
+        };
+        let mut best = (bytes, grid);
+        for (step, lambda) in QUALITY_LAMBDAS.into_iter().enumerate() {
+            self.say(CELLS.len() * INTERVALS.len() + step, steps);
+            let mut settings = grid;
+            settings.coding.lambda = lambda;
+            let (bytes, psnr) = measure(&settings)?;
+            if psnr >= asked && bytes < best.0 {
+                best = (bytes, settings);
+            }
+        }
+        Ok(Some(best.1))
+    }
+}
+
+/// Bytes that a source image takes in a bundle, with its labels and its mask.
+fn image_bytes(atlas: &Atlas) -> usize {
+    let image = &atlas.image;
+    let mask = if image.labels.iter().any(|label| label.masked) { image.texels.len() / 8 } else { 0 };
+    image.texels.len() + 2 * image.palette.len() + cubist_core::format::LABEL_BYTES * image.labels.len() + mask
+}
+
+/// Some frames of the truth.
+struct Samples {
+    frames: Vec<u32>,
+    pictures: Vec<Vec<u8>>,
+}
+
+impl Samples {
+    fn new(scene: &Scene) -> Self {
+        let truth = Truth::new(scene);
+        let frames = scattered(scene.playback.frames);
+        let pictures = frames.iter().map(|&frame| truth.frame(frame)).collect();
+        Self { frames, pictures }
+    }
+
+    /// The mean squared error of exact rays through a source image.
+    fn of_image(&self, atlas: &Atlas) -> f64 {
+        let errors = self.frames.iter().zip(&self.pictures).map(|(&frame, truth)| {
+            let exact = verify::exact_frame(atlas, frame);
+            metrics::mean_squared_error(&exact, truth)
+        });
+        errors.sum::<f64>() / self.frames.len().max(1) as f64
+    }
+
+    /// The mean squared error and the mean PSNR, dB, of a bundle.
+    fn of_bundle(&self, bundle: &[u8]) -> Result<(f64, f64), BakeError> {
+        let (mut error, mut psnr, mut truth) = (0.0, 0.0, self.pictures.iter());
+        verify::play(bundle, &self.frames, |_, played| {
+            let now = truth.next().map_or(0.0, |truth| metrics::mean_squared_error(played, truth));
+            error += now;
+            psnr += metrics::psnr(now);
+        })?;
+        let count = self.frames.len().max(1) as f64;
+        Ok((error / count, psnr / count))
+    }
+}
+
+/// Frames that lie evenly on the path but fall on keys no more often than others, whatever the interval.
+fn scattered(frames: u32) -> Vec<u32> {
+    // Multiples of the golden ratio modulo 1 spread best; 0.618.. as a 32-bit fraction.
+    const GOLDEN: u64 = 2_654_435_769;
+    let place = |i: u64| (((2 * i + 1) * GOLDEN / 2) & 0xffff_ffff) * u64::from(frames);
+    let mut out: Vec<u32> = (0..u64::from(SAMPLES)).map(|i| (place(i) >> 32) as u32).collect();
+    out.sort_unstable();
+    out.dedup();
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::{TruthFrames, bake_scene};
+    use crate::scene::builtin;
+
+    fn small(name: &str) -> Scene {
+        let mut scene = builtin::build(name).unwrap();
+        (scene.playback.width, scene.playback.height, scene.playback.frames) = (64, 48, 12);
+        scene
+    }
+
+    #[test]
+    fn samples_lie_everywhere() {
+        let frames = scattered(128);
+        assert_eq!(frames.len(), SAMPLES as usize);
+        assert!(frames[0] < 16 && frames[11] >= 112 && frames.windows(2).all(|w| w[1] - w[0] < 24), "{frames:?}");
+        assert!(frames.iter().filter(|f| *f % 4 == 0).count() <= 5, "{frames:?}");
+        assert_eq!(scattered(1), [0]);
+    }
+
+    #[test]
+    fn a_budget_is_kept_and_more_of_it_is_no_worse() {
+        let scene = small("cone-orbit");
+        let bake = |budget| {
+            let options = Options { goal: Goal::Budget(budget), truth: TruthFrames::All, ..Options::default() };
+            bake_scene(&scene, &options, &|_, _| {})
+        };
+        let (bytes, small) = bake(6_000).unwrap();
+        assert!(bytes.len() <= 6_000, "{}", bytes.len());
+        let (bytes, large) = bake(12_000).unwrap();
+        assert!(bytes.len() <= 12_000, "{}", bytes.len());
+        let psnr = |report: &crate::Report| report.quality_vs_truth.unwrap().psnr_mean;
+        assert!(psnr(&large) >= psnr(&small) - 0.2, "{} {}", psnr(&large), psnr(&small));
+        let Err(BakeError::Budget { budget: 500, smallest }) = bake(500) else { panic!("500 bytes cannot hold a scene") };
+        assert!((500..6_000).contains(&smallest), "{smallest}");
+    }
+
+    #[test]
+    fn a_quality_is_reached_or_the_nearest_is_named() {
+        let scene = small("cone-orbit");
+        let bake = |asked| {
+            let options = Options { goal: Goal::Psnr(asked), truth: TruthFrames::None, ..Options::default() };
+            bake_scene(&scene, &options, &|_, _| {})
+        };
+        let (plain, report) = bake_scene(&scene, &Options::default(), &|_, _| {}).unwrap();
+        let reached = report.quality.psnr_mean;
+        let (bytes, report) = bake(reached - 1.0).unwrap();
+        assert!(report.quality.psnr_mean >= reached - 1.0 && bytes.len() <= plain.len());
+        let Err(error @ BakeError::Psnr { nearest, .. }) = bake(98.0) else { panic!("98 dB are out of reach") };
+        assert!(nearest > reached && error.to_string().contains(&format!("{nearest:.2}")), "{error}");
+    }
+}

@@ -1,0 +1,360 @@
+//! Verification: the finished bytes, played by the real player, against exact ray casting and against the truth.
+//! Bytes come from `encode`, exact positions from the G-buffer, the truth from [`Truth`]; figures go to the report.
+//!
+//! Frames are played and compared one at a time: memory does not grow with the path. Sums run in the order of frames,
+//! so the figures do not depend on the number of threads.
+
+use crate::atlas::{Atlas, Label, SourceImage};
+use crate::gbuffer::GBuffer;
+use crate::metrics::{self, Histogram};
+use crate::truth::Truth;
+use cubist_core::fixed::{PLAY_BITS, PlayUv};
+use cubist_core::{Bundle, Frame, Player, Probe};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::time::Instant;
+use thiserror::Error;
+
+/// Frames that one player plays in a row while others play the rest.
+const RUN: u32 = 16;
+
+/// Why a finished bundle cannot be verified: always the baker's fault.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum VerifyError {
+    /// The player refuses the bytes.
+    #[error("the finished bundle is refused by the player: {0}")]
+    Refused(#[from] cubist_core::BundleError),
+    /// The player refuses the memory it asked for.
+    #[error("the finished bundle states less working memory than it needs: {0}")]
+    Memory(#[from] cubist_core::MemoryError),
+    /// The bundle shows something else than the scene asks for.
+    #[error("the finished bundle shows {found:?} (width, height, frames), expected {expected:?}")]
+    Shape {
+        /// Width, height, frames of the G-buffer.
+        expected: [u32; 3],
+        /// Those of the bundle.
+        found: [u32; 3],
+    },
+}
+
+/// Distances between played and exact positions, texels, the larger of |du| and |dv|; over pixels of the right surface.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PathError {
+    /// Half of the pixels are not farther off.
+    pub p50: f64,
+    /// 99 % of the pixels are not farther off.
+    pub p99: f64,
+    /// The worst pixel.
+    pub max: f64,
+}
+
+/// Playback against exact ray casting of every pixel of every frame through the same source image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Quality {
+    /// Mean of the frames' PSNR, dB; a frame without any error counts [`metrics::PERFECT`].
+    pub psnr_mean: f64,
+    /// The worst frame's, dB.
+    pub psnr_min: f64,
+    /// The first frame of that PSNR.
+    pub worst_frame: u32,
+    /// Mean of the frames' SSIM.
+    pub ssim_mean: f64,
+    /// Mean of the frames' PSNR where both sides look the source image up bilinearly, dB: what the paths alone cost.
+    pub psnr_bilinear: f64,
+    /// Share of pixels that show another surface than the exact ray hits, %.
+    pub wrong_surface_percent: f64,
+    /// How far the played paths are off.
+    pub path_error_texels: PathError,
+}
+
+/// Playback against the antialiased scene itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TruthQuality {
+    /// Mean of the frames' PSNR, dB.
+    pub psnr_mean: f64,
+    /// Mean of the frames' SSIM.
+    pub ssim_mean: f64,
+    /// How many frames were compared, evenly spread over the path.
+    pub truth_frames: u32,
+}
+
+/// What playing costs, per frame where not said otherwise.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Work {
+    /// Keys decoded.
+    pub keys_mean: f64,
+    /// Layers interpolated in time.
+    pub layers_mean: f64,
+    /// Layers in the worst frame.
+    pub layers_worst: u32,
+    /// Pixels in smooth cells.
+    pub smooth_pixels_mean: f64,
+    /// Pixels in torn cells.
+    pub torn_pixels_mean: f64,
+    /// Share of pixels in torn cells, %.
+    pub torn_percent: f64,
+    /// Coverage tests.
+    pub coverage_tests_mean: f64,
+    /// Coverage tests in the worst frame.
+    pub coverage_tests_worst: u32,
+    /// Frames per second on this machine, one thread, all frames in order.
+    pub host_frames_per_second: f64,
+}
+
+/// A player's pixel as R, G, B: leading bits repeated.
+#[must_use]
+pub fn rgb(pixel: u16) -> [u8; 3] {
+    let (r, g, b) = (pixel >> 11, pixel >> 5 & 63, pixel & 31);
+    [r << 3 | r >> 2, g << 2 | g >> 4, b << 3 | b >> 2].map(|v| v as u8)
+}
+
+/// Renders frames of a bundle into memory of its own.
+pub struct Screen<'p, 'a> {
+    player: &'p mut Player<'a>,
+    row: Vec<u16>,
+    height: u32,
+}
+
+impl<'p, 'a> Screen<'p, 'a> {
+    /// A screen for what `player` plays.
+    pub fn new(player: &'p mut Player<'a>) -> Self {
+        let (width, height) = player.bundle().size();
+        Self { player, row: vec![0; width as usize], height }
+    }
+
+    /// Plays frame `frame` into `out`: R, G, B, row by row.
+    pub fn play(&mut self, frame: u32, out: &mut Vec<u8>) {
+        out.clear();
+        self.player.seek(Frame(frame));
+        for y in 0..self.height {
+            self.player.row(y, &mut self.row);
+            out.extend(self.row.iter().flat_map(|&pixel| rgb(pixel)));
+        }
+    }
+
+    /// Where the pixels of row `y` of the current frame come from.
+    fn probe(&mut self, y: u32, out: &mut [Probe]) {
+        self.player.probe_row(y, out);
+    }
+
+    /// For every label of the bundle the label of `image` with the same chart: folded surfaces have several (see [`crate::folds`]).
+    fn charts(&self, image: &SourceImage) -> Vec<u8> {
+        let bundle = self.player.bundle();
+        let chart = |label: usize| {
+            let own = bundle.label(label as u8);
+            let same = |l: &Label| l.rect == [own.left, own.top, own.right, own.bottom];
+            if label < image.labels.len() { label } else { image.labels.iter().position(same).unwrap_or(0) }
+        };
+        (0..bundle.label_count()).map(|label| chart(label) as u8).collect()
+    }
+}
+
+/// Runs `then` with a player of `bundle` in memory of its own.
+fn with_screen<R>(bundle: &Bundle<'_>, then: impl FnOnce(Screen<'_, '_>) -> R) -> Result<R, VerifyError> {
+    let mut memory = vec![0; bundle.memory_needed()];
+    let mut player = Player::new(bundle, &mut memory)?;
+    Ok(then(Screen::new(&mut player)))
+}
+
+/// Plays the frames `frames` of a finished bundle; `show` gets each one's number and its R, G, B bytes, row by row.
+///
+/// # Errors
+/// [`VerifyError`] where the player refuses the bytes.
+pub fn play(bytes: &[u8], frames: &[u32], mut show: impl FnMut(u32, &[u8])) -> Result<(), VerifyError> {
+    let bundle = Bundle::parse(bytes)?;
+    with_screen(&bundle, |mut screen| {
+        let mut picture = Vec::new();
+        for &frame in frames {
+            screen.play(frame, &mut picture);
+            show(frame, &picture);
+        }
+    })
+}
+
+/// Frame `frame` as exact rays see it through the source image, nearest texel: R, G, B, row by row.
+#[must_use]
+pub fn exact_frame(atlas: &Atlas, frame: u32) -> Vec<u8> {
+    let (image, gbuffer) = (&atlas.image, &atlas.gbuffer);
+    let colour = |uv: &[f32; 2]| {
+        let texel = image.texels[uv[1] as usize * image.width as usize + uv[0] as usize];
+        image.palette.get(usize::from(texel)).copied().unwrap_or_default()
+    };
+    gbuffer.uv[pixels_of(gbuffer, frame)].iter().flat_map(colour).collect()
+}
+
+fn pixels_of(gbuffer: &GBuffer, frame: u32) -> std::ops::Range<usize> {
+    let size = gbuffer.width as usize * gbuffer.height as usize;
+    frame as usize * size..(frame as usize + 1) * size
+}
+
+/// The bilinear colour at `uv`, 0..=255 a component, from texels of the rectangle of `label` alone.
+#[inline]
+fn bilinear(image: &SourceImage, label: usize, [u, v]: [f32; 2]) -> [f32; 3] {
+    let Some(rect) = image.labels.get(label).map(|l| l.rect) else { return [0.0; 3] };
+    let clamp = |i: i32, axis: usize| i.clamp(i32::from(rect[axis]), i32::from(rect[axis + 2].max(rect[axis] + 1)) - 1) as usize;
+    let (x, y) = (u - 0.5, v - 0.5);
+    let (x0, y0) = (x.floor(), y.floor());
+    let (fx, fy) = (x - x0, y - y0);
+    let (left, right) = (clamp(x0 as i32, 0), clamp(x0 as i32 + 1, 0));
+    let (top, bottom) = (clamp(y0 as i32, 1) * image.width as usize, clamp(y0 as i32 + 1, 1) * image.width as usize);
+    let at = |index: usize| image.palette.get(usize::from(image.texels.get(index).copied().unwrap_or(0))).copied().unwrap_or_default();
+    let [a, b, c, d] = [top + left, top + right, bottom + left, bottom + right].map(at);
+    std::array::from_fn(|k| {
+        let mix = |a: u8, b: u8| f32::from(a) + (f32::from(b) - f32::from(a)) * fx;
+        let (top, bottom) = (mix(a[k], b[k]), mix(c[k], d[k]));
+        top + (bottom - top) * fy
+    })
+}
+
+fn texels(at: PlayUv) -> [f32; 2] {
+    [at.u, at.v].map(|x| x as f32 / (1u32 << PLAY_BITS) as f32)
+}
+
+/// What one run of frames adds up to; the lists have an entry a frame.
+#[derive(Default)]
+struct Sums {
+    psnr: Vec<f64>,
+    bilinear: Vec<f64>,
+    ssim: Vec<f64>,
+    wrong: u64,
+    path: Histogram,
+}
+
+/// Compares every pixel of every frame of a finished bundle with exact ray casting through the same source image.
+/// `progress` hears (frames done, frames in all).
+///
+/// # Errors
+/// [`VerifyError`] where the player refuses the bytes or they are of another size.
+pub fn against_exact(bytes: &[u8], atlas: &Atlas, progress: &(dyn Fn(u32, u32) + Sync)) -> Result<Quality, VerifyError> {
+    let bundle = Bundle::parse(bytes)?;
+    let gbuffer = &atlas.gbuffer;
+    let (width, height) = bundle.size();
+    let (expected, found) = ([gbuffer.width, gbuffer.height, gbuffer.frames], [width, height, bundle.frames()]);
+    if expected != found {
+        return Err(VerifyError::Shape { expected, found });
+    }
+    let done = AtomicU32::new(0);
+    let runs: Vec<Sums> = (0..gbuffer.frames.div_ceil(RUN))
+        .into_par_iter()
+        .map(|run| {
+            with_screen(&bundle, |mut screen| {
+                let mut sums = Sums::default();
+                let mut played = Vec::new();
+                for frame in run * RUN..((run + 1) * RUN).min(gbuffer.frames) {
+                    screen.play(frame, &mut played);
+                    sums.add(&mut screen, &played, atlas, frame);
+                    progress(done.fetch_add(1, Ordering::Relaxed) + 1, gbuffer.frames);
+                }
+                sums
+            })
+        })
+        .collect::<Result<_, _>>()?;
+    let mut path = Histogram::default();
+    runs.iter().for_each(|run| path.merge(&run.path));
+    let all = |list: fn(&Sums) -> &Vec<f64>| runs.iter().flat_map(list).copied();
+    let mean = |list: fn(&Sums) -> &Vec<f64>| all(list).sum::<f64>() / f64::from(gbuffer.frames.max(1));
+    let (worst_frame, psnr_min) = (0..).zip(all(|run| &run.psnr)).min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, metrics::PERFECT));
+    let wrong: u64 = runs.iter().map(|run| run.wrong).sum();
+    Ok(Quality {
+        psnr_mean: mean(|run| &run.psnr),
+        psnr_min,
+        worst_frame,
+        ssim_mean: mean(|run| &run.ssim),
+        psnr_bilinear: mean(|run| &run.bilinear),
+        wrong_surface_percent: 100.0 * wrong as f64 / gbuffer.label.len().max(1) as f64,
+        path_error_texels: PathError { p50: path.percentile(0.5), p99: path.percentile(0.99), max: path.max() },
+    })
+}
+
+impl Sums {
+    /// Adds the current frame of `screen`, whose pixels are `played`.
+    fn add(&mut self, screen: &mut Screen<'_, '_>, played: &[u8], atlas: &Atlas, frame: u32) {
+        let (image, gbuffer) = (&atlas.image, &atlas.gbuffer);
+        let (width, pixels) = (gbuffer.width as usize, pixels_of(gbuffer, frame));
+        let exact = exact_frame(atlas, frame);
+        self.psnr.push(metrics::psnr(metrics::mean_squared_error(played, &exact)));
+        self.ssim.push(metrics::ssim(played, &exact, width));
+        let mut probes = vec![Probe::default(); width];
+        let charts = screen.charts(image);
+        let mut squares = 0f64;
+        let rows = gbuffer.label[pixels.clone()].chunks(width).zip(gbuffer.uv[pixels].chunks(width));
+        for (y, (labels, uvs)) in (0..).zip(rows) {
+            screen.probe(y, &mut probes);
+            for probe in &mut probes {
+                probe.label = charts[usize::from(probe.label)];
+            }
+            let mut row = 0f32;
+            for ((&label, &exact), probe) in labels.iter().zip(uvs).zip(&probes) {
+                let at = texels(probe.at);
+                if label == u16::from(probe.label) {
+                    self.path.add((at[0] - exact[0]).abs().max((at[1] - exact[1]).abs()));
+                } else {
+                    self.wrong += 1;
+                }
+                let (a, b) = (bilinear(image, usize::from(probe.label), at), bilinear(image, usize::from(label), exact));
+                row += a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f32>();
+            }
+            squares += f64::from(row);
+        }
+        self.bilinear.push(metrics::psnr(squares / (played.len().max(1) as f64)));
+    }
+}
+
+/// Compares the frames `frames` of a finished bundle with the scene itself. `progress` hears (frames done, frames in all).
+///
+/// # Errors
+/// [`VerifyError`] where the player refuses the bytes.
+pub fn against_truth(
+    bytes: &[u8],
+    truth: &Truth<'_>,
+    frames: &[u32],
+    progress: &(dyn Fn(u32, u32) + Sync),
+) -> Result<TruthQuality, VerifyError> {
+    let width = Bundle::parse(bytes)?.size().0 as usize;
+    let (mut psnr, mut ssim, mut done) = (0.0, 0.0, 0);
+    play(bytes, frames, |frame, played| {
+        let exact = truth.frame(frame);
+        psnr += metrics::psnr(metrics::mean_squared_error(played, &exact));
+        ssim += metrics::ssim(played, &exact, width);
+        done += 1;
+        progress(done, frames.len() as u32);
+    })?;
+    let count = frames.len().max(1) as f64;
+    Ok(TruthQuality { psnr_mean: psnr / count, ssim_mean: ssim / count, truth_frames: frames.len() as u32 })
+}
+
+/// Plays all frames in order on one thread and counts the work.
+///
+/// # Errors
+/// [`VerifyError`] where the player refuses the bytes.
+pub fn work(bytes: &[u8]) -> Result<Work, VerifyError> {
+    let bundle = Bundle::parse(bytes)?;
+    let ((width, height), frames) = (bundle.size(), bundle.frames());
+    let mut memory = vec![0; bundle.memory_needed()];
+    let mut player = Player::new(&bundle, &mut memory)?;
+    // A new player holds the first keys already: starting from the end, frame 0 is charged for them like any other.
+    player.seek(Frame(frames - 1));
+    let mut row = vec![0u16; width as usize];
+    let mut sums = [0u64; 5];
+    let mut work = Work::default();
+    let start = Instant::now();
+    for frame in 0..frames {
+        player.seek(Frame(frame));
+        for y in 0..height {
+            player.row(y, &mut row);
+        }
+        let now = player.work();
+        for (sum, count) in sums.iter_mut().zip([now.keys, now.layers, now.smooth_pixels, now.torn_pixels, now.coverage_tests]) {
+            *sum += u64::from(count);
+        }
+        work.layers_worst = work.layers_worst.max(now.layers);
+        work.coverage_tests_worst = work.coverage_tests_worst.max(now.coverage_tests);
+    }
+    work.host_frames_per_second = f64::from(frames) / start.elapsed().as_secs_f64().max(1e-9);
+    let [keys, layers, smooth, torn, tests] = sums.map(|sum| sum as f64 / f64::from(frames));
+    (work.keys_mean, work.layers_mean, work.smooth_pixels_mean) = (keys, layers, smooth);
+    (work.torn_pixels_mean, work.coverage_tests_mean) = (torn, tests);
+    work.torn_percent = 100.0 * torn / (smooth + torn).max(1.0);
+    Ok(work)
+}
