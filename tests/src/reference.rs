@@ -33,7 +33,7 @@ pub type Four = [f64; 4];
 
 /// The exact weights at `t` (0..=1) of an interval of `lengths[1]` frames between intervals of `lengths[0]` and `lengths[2]`, where
 /// `missing` tells which of the outer keys carry no layer: a cubic Hermite curve through the inner two, with the secants over two
-/// intervals as tangents; with the interval's own secant where a key is missing.
+/// intervals as tangents. A missing key's tangent is the one that leaves no cubic term; without both the curve is straight.
 #[must_use]
 pub fn weights(time: u8, lengths: [u32; 3], t: f64, missing: [bool; 2]) -> Four {
     match time {
@@ -44,24 +44,22 @@ pub fn weights(time: u8, lengths: [u32; 3], t: f64, missing: [bool; 2]) -> Four 
         _ => return [0.0, 1.0 - t, t, 0.0],
     }
     let [before, length, after] = lengths.map(f64::from);
-    let (leaving, arriving) = (t * (1.0 - t) * (1.0 - t), t * t * (t - 1.0));
-    let value = t * t * (3.0 - 2.0 * t);
-    let mut weights = [0.0, 1.0 - value, value, 0.0];
-    let mut tangent = |amount: f64, from: usize, to: usize, frames: f64| {
-        weights[from] -= amount * length / frames;
-        weights[to] += amount * length / frames;
+    // What the keys weigh in the values at both ends, their difference, and the tangents there, an interval long.
+    let (start, end, difference) = ([0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 1.0, 0.0]);
+    let secants: [Four; 2] =
+        [[-1.0, 0.0, 1.0, 0.0].map(|x| x * length / (before + length)), [0.0, -1.0, 0.0, 1.0].map(|x| x * length / (length + after))];
+    // A parabola's tangents at both ends add up to twice the difference.
+    let other = |tangent: Four| [0, 1, 2, 3].map(|key: usize| 2.0 * difference[key] - tangent[key]);
+    let [leaving, arriving] = match missing {
+        [false, false] => secants,
+        [true, false] => [other(secants[1]), secants[1]],
+        [false, true] => [secants[0], other(secants[0])],
+        [true, true] => [difference; 2],
     };
-    if missing[0] {
-        tangent(leaving, 1, 2, length)
-    } else {
-        tangent(leaving, 0, 2, before + length)
-    };
-    if missing[1] {
-        tangent(arriving, 1, 2, length)
-    } else {
-        tangent(arriving, 1, 3, length + after)
-    };
-    weights
+    [0, 1, 2, 3].map(|key: usize| {
+        let value = t * t * (3.0 - 2.0 * t);
+        start[key] * (1.0 - value) + end[key] * value + leaving[key] * t * (1.0 - t) * (1.0 - t) + arriving[key] * t * t * (t - 1.0)
+    })
 }
 
 /// A layer of a node: a label, its position in the source image, texels, and its fields, pixels.
