@@ -87,7 +87,7 @@ pub struct Settings {
     pub atlas: atlas::Settings,
     /// The keys.
     pub coding: CodingSettings,
-    /// A label seen in fewer pixels of a cell and interval is left out of it.
+    /// A label seen in fewer pixels of a cell and interval is left out of it; a torn part of one in fewer than twice as many.
     pub least_pixels: u32,
     /// Wrong pixels that a field has to save in a cell and interval to be used.
     pub field_price: u32,
@@ -101,7 +101,7 @@ impl Default for Settings {
             time: TIME_CUBIC,
             atlas: atlas::Settings::default(),
             coding: CodingSettings { step_log2: 0, lambda: 0.05, independent_every: 16 },
-            least_pixels: 4,
+            least_pixels: 8,
             field_price: 4,
         }
     }
@@ -166,7 +166,7 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let Atlas { image, gbuffer, .. } = &flat.atlas;
     let grid = KeyGrid::new(gbuffer, settings.cell.trailing_zeros() as u8, settings.key_interval, scene.playback.looping, settings.time);
     progress("finding sheets", 0.0);
-    let Folded { gbuffer, labels } = folds::unfold(gbuffer, &flat.tears, &grid, &image.labels, settings.least_pixels);
+    let Folded { gbuffer, labels } = folds::unfold(gbuffer, &flat.tears, &grid, &image.labels, 2 * settings.least_pixels);
     let (gbuffer, image) = (&gbuffer, &SourceImage { labels, ..image.clone() });
     let mut sheets = sheets::find(gbuffer, &grid, settings.least_pixels);
     let layers = Layers::of(&grid, &sheets);

@@ -51,14 +51,19 @@ impl Leaf {
         if det == 0.0 {
             return None;
         }
-        let inverse = 1.0 / det;
         let s = origin - self.corner;
-        let b = s.dot(p) * inverse;
-        if !(-1e-4..=1.0001).contains(&b) {
+        // Most candidates end here or below: no division until the triangle is all but hit.
+        let (size, scaled_b) = (det.abs(), s.dot(p) * det.signum());
+        if !(scaled_b >= -1e-4 * size && scaled_b <= 1.0001 * size) {
             return None;
         }
         let q = s.cross(e1);
-        let c = direction.dot(q) * inverse;
+        let scaled_c = direction.dot(q) * det.signum();
+        if !(scaled_c >= -1e-4 * size && scaled_b + scaled_c <= 1.0002 * size) {
+            return None;
+        }
+        let inverse = 1.0 / det;
+        let (b, c) = (s.dot(p) * inverse, direction.dot(q) * inverse);
         let outside = -b.min(c).min(1.0 - b - c);
         if outside > OVERLAP {
             // The weights of far, small or grazing triangles are rounded by more than the overlap.

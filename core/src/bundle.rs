@@ -8,7 +8,6 @@ use crate::format::{
     MAX_SECTIONS, MAX_SHEETS, PATH, Path, Section, TIME_CUBIC, VERSION,
 };
 use crate::grid::Grid;
-use crate::{memory, timeline};
 use heapless::Vec;
 
 /// A parsed bundle: cheap to copy around by reference, borrowing everything from the bytes.
@@ -92,12 +91,6 @@ impl<'a> Bundle<'a> {
     #[must_use]
     pub fn looping(&self) -> bool {
         self.path.looping
-    }
-
-    /// Bytes of working memory that a player of this bundle asks for.
-    #[must_use]
-    pub fn memory_needed(&self) -> usize {
-        memory::needed(self)
     }
 
     /// The bounds on memory and work that the bundle states.
@@ -239,7 +232,7 @@ fn check_path<'a>(path: &Path<'a>) -> Result<&'a [[u8; KEY_BYTES]], BundleError>
         (frame, end) = (key.frame, key.end);
         run = if key.independent { 1 } else { run.saturating_add(1) };
         // A seek decodes from an independent key up to the last one that the frame needs.
-        let (back, ahead) = timeline::reach(path.time);
+        let (back, ahead) = format::reach(path.time);
         let most = run.saturating_add(back.saturating_add(ahead) as u32);
         field(most <= u32::from(path.limits.seek_keys), "PATH seek_keys", u32::from(path.limits.seek_keys))?;
     }

@@ -143,6 +143,12 @@ pub const TIME_LINEAR: u8 = 1;
 /// Catmull-Rom curves through four keys, straight at a layer's first and last.
 pub const TIME_CUBIC: u8 = 2;
 
+/// How many keys before an interval's first and after its first one are needed to play it.
+#[must_use]
+pub const fn reach(time: u8) -> (usize, usize) {
+    if time == TIME_CUBIC { (1, 2) } else { (0, 1) }
+}
+
 /// One camera path: the screen, the grid, the timeline and the coded keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Path<'a> {

@@ -29,7 +29,6 @@
     clippy::arithmetic_side_effects,
     clippy::float_arithmetic
 )]
-#![cfg_attr(test, expect(clippy::indexing_slicing, clippy::unwrap_used, clippy::arithmetic_side_effects, reason = "tests may fail loudly"))]
 
 mod atlas;
 mod bundle;

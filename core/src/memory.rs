@@ -3,10 +3,10 @@
 
 use crate::Bundle;
 use crate::cell::{Layer, NodeRow, RowSheets, Sheet};
+use crate::format;
 use crate::key::{self, Key};
 use crate::lists::{self, Lists};
 use crate::record::Stream;
-use crate::timeline;
 use bytemuck::Pod;
 
 /// The caller's memory, cut up.
@@ -44,7 +44,7 @@ impl<'m> Cutter<'m> {
 fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
     let (grid, limits) = (bundle.grid(), bundle.limits());
     let (key_layers, row_layers) = (usize::from(limits.key_layers), usize::from(limits.row_layers));
-    let (back, ahead) = timeline::reach(bundle.path().time);
+    let (back, ahead) = format::reach(bundle.path().time);
     // Playing needs these; telling the next key needs the last two and itself.
     let slots = back.saturating_add(ahead).saturating_add(1).max(3);
     let fields = usize::from(limits.fields);
@@ -81,11 +81,14 @@ fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
     }
 }
 
-/// Bytes that a player of `bundle` needs, at any alignment.
-pub fn needed(bundle: &Bundle<'_>) -> usize {
-    let mut counter = Cutter { rest: &mut [], words: 0 };
-    let _ = cut(bundle, &mut counter);
-    counter.words.saturating_mul(4).saturating_add(3)
+impl Bundle<'_> {
+    /// Bytes of working memory that a player of this bundle asks for, at any alignment.
+    #[must_use]
+    pub fn memory_needed(&self) -> usize {
+        let mut counter = Cutter { rest: &mut [], words: 0 };
+        let _ = cut(self, &mut counter);
+        counter.words.saturating_mul(4).saturating_add(3)
+    }
 }
 
 /// `memory` cut up for `bundle`; `None` where it is too small.

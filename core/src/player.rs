@@ -4,13 +4,13 @@ use crate::cell::{Around, NodeRow, RowSheets};
 use crate::coder::Decoder;
 use crate::coverage::Chart;
 use crate::fixed::PlayUv;
-use crate::format::{Limits, STRIP};
+use crate::format::{self, Limits, STRIP};
 use crate::key::Nothing;
 use crate::lists::{CHART, FIELD};
 use crate::memory::{self, Workspace};
 use crate::record::Shape;
 use crate::span::{self, Test};
-use crate::timeline::{self, Moment};
+use crate::timeline::Moment;
 use crate::{Bundle, MemoryError};
 
 /// A frame number.
@@ -164,7 +164,7 @@ impl<'a> Player<'a> {
 
     /// The keys that the current moment needs.
     fn needed(&self) -> Needed {
-        let (back, ahead) = timeline::reach(self.bundle.path().time);
+        let (back, ahead) = format::reach(self.bundle.path().time);
         let (keys, from) = (self.bundle.key_count(), self.moment.interval);
         let end = from.saturating_add(ahead);
         if self.bundle.looping() {
@@ -253,7 +253,7 @@ impl<'a> Player<'a> {
             stream.key(age.checked_add_signed(offset.wrapping_neg())?).filter(|_| inside)
         };
         let Some((start, lists)) = stream.key(age).zip(stream.lists(age)) else { return };
-        let cubic = timeline::reach(bundle.path().time).0 == 1;
+        let cubic = format::reach(bundle.path().time).0 == 1;
         let around = Around {
             before: at(-1).filter(|_| cubic),
             from: start,

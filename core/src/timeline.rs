@@ -23,12 +23,6 @@ pub struct Moment {
     pub linear: i32,
 }
 
-/// How many keys before an interval's first and after its first one are needed to play it.
-#[must_use]
-pub const fn reach(time: u8) -> (usize, usize) {
-    if time == TIME_CUBIC { (1, 2) } else { (0, 1) }
-}
-
 /// The weights `passed` frames into an interval of `lengths[1]` frames, between intervals of `lengths[0]` and `lengths[2]`
 /// (0: there is none): a cubic Hermite curve whose tangents are the secants over two intervals (Catmull and Rom 1974, for unequal intervals), or
 /// over the one where a key is missing.

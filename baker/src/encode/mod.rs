@@ -154,7 +154,7 @@ fn limits(content: &Content<'_>, labels: &[LabelRecord], settings: CodingSetting
     let count = |from: usize, to: usize| (layers.start[to] - layers.start[from]) as usize;
     let most = |values: &mut dyn Iterator<Item = usize>| u16::try_from(values.max().unwrap_or(0)).unwrap_or(u16::MAX);
     let width = grid.grid.node_columns();
-    let (back, ahead) = cubist_core::timeline::reach(grid.time);
+    let (back, ahead) = cubist_core::format::reach(grid.time);
     Limits {
         key_layers: most(&mut (0..grid.keys.len()).map(|key| count(key * nodes, (key + 1) * nodes))),
         row_layers: most(&mut (0..grid.keys.len() * grid.grid.node_rows()).map(|row| count(row * width, (row + 1) * width))),

@@ -1,0 +1,161 @@
+//! The layout that ARCHITECTURE.md describes, held against the sources: who may name what, and how a file looks.
+//! Every `.rs` file of the checkout comes in, and the manifests; out come the places that break a rule.
+
+#[path = "architecture/source.rs"]
+mod source;
+
+use source::Source;
+use std::collections::BTreeMap;
+
+/// The core's modules from the bottom up: each may use those before it, none after it.
+const ORDER: [&str; 18] = [
+    "error", "fixed", "format", "coder", "grid", "lists", "key", "record", "atlas", "coverage", "span", "bundle", "timeline", "cell",
+    "memory", "player", "graphics", "lib",
+];
+
+/// Crates that only certain files (or folders, with a slash at the end) may name, so that they can be replaced there.
+const ROOMS: [(&str, &[&str]); 5] = [
+    ("obvhs", &["baker/src/trace.rs"]),
+    ("gltf", &["baker/src/scene/gltf.rs", "baker/src/scene/gltf/"]),
+    ("tiny_skia", &["player-host/src/canvas.rs"]),
+    // Keys arrive as winit's: `keys` turns them into actions.
+    ("winit", &["player-host/src/window.rs", "player-host/src/keys.rs"]),
+    ("softbuffer", &["player-host/src/window.rs"]),
+];
+
+/// The packages, and which of ours each may depend on.
+const PACKAGES: [(&str, &[&str]); 4] =
+    [("core", &[]), ("baker", &["cubist-core"]), ("player-host", &["cubist-core", "cubist-baker"]), ("player-mcu/proof", &["cubist-core"])];
+
+const LONGEST_FILE: usize = 600;
+
+fn none(found: Vec<String>) {
+    assert!(found.is_empty(), "\n{}", found.join("\n"));
+}
+
+#[test]
+fn the_sources_are_found() {
+    let sources = source::all();
+    for path in
+        ["core/src/lib.rs", "baker/src/trace.rs", "player-host/src/main.rs", "tests/tests/architecture.rs", "player-mcu/proof/src/main.rs"]
+    {
+        assert!(sources.iter().any(|s| s.path == path), "{path} is not among the {} sources", sources.len());
+    }
+}
+
+#[test]
+fn every_file_says_what_it_is() {
+    let silent = |s: &&Source| !s.text.starts_with("//! ");
+    none(source::all().iter().filter(silent).map(|s| format!("{}: begins without a `//!` that says what it is", s.path)).collect());
+}
+
+#[test]
+fn no_file_is_too_long() {
+    let sources = source::all();
+    let lines = |s: &Source| s.text.lines().count();
+    let long = sources.iter().filter(|s| lines(s) > LONGEST_FILE);
+    none(long.map(|s| format!("{}: {} lines, at most {LONGEST_FILE}: it is two rooms", s.path, lines(s))).collect());
+}
+
+#[test]
+fn nothing_is_unsafe_and_no_lint_is_silenced_without_a_reason() {
+    let mut found = Vec::new();
+    for source in source::all() {
+        let code = source.code();
+        if source::words(&code).any(|(_, word)| word == "unsafe") {
+            found.push(format!("{}: unsafe", source.path));
+        }
+        if code.contains("#[allow(") || code.contains("#![allow(") {
+            found.push(format!("{}: an allow attribute; write #[expect(lint, reason = \"...\")]", source.path));
+        }
+    }
+    none(found);
+}
+
+#[test]
+fn crates_keep_to_their_rooms() {
+    let mut found = Vec::new();
+    for source in source::all() {
+        let code = source.code();
+        for (name, rooms) in ROOMS {
+            let at_home = rooms.iter().any(|room| if room.ends_with('/') { source.path.starts_with(room) } else { source.path == *room });
+            let named = source::words(&code).any(|(at, word)| word == name && names_the_crate(&code, at, name));
+            if named && !at_home {
+                found.push(format!("{}: names {name}, which only {} may", source.path, rooms.join(" and ")));
+            }
+        }
+    }
+    none(found);
+}
+
+/// Whether the word `name` at `at` is the crate: a path starts with it. The loader of glTF is a module called `gltf`, so
+/// there only `::gltf` and `use gltf` are the crate.
+fn names_the_crate(code: &str, at: usize, name: &str) -> bool {
+    let before = code[..at].trim_end();
+    if let Some(path) = before.strip_suffix("::") {
+        return !path.ends_with(|c: char| c.is_alphanumeric() || c == '_' || c == '>');
+    }
+    let path = code[at + name.len()..].starts_with("::");
+    let used = before.ends_with("use") || before.ends_with("extern crate");
+    used || (path && name != "gltf")
+}
+
+#[test]
+fn packages_depend_on_ours_only_downwards() {
+    let mut found = Vec::new();
+    for (package, allowed) in PACKAGES {
+        for name in source::own_dependencies(package) {
+            if !allowed.contains(&name.as_str()) {
+                found.push(format!("{package}/Cargo.toml: depends on {name}; it may on {allowed:?}"));
+            }
+        }
+    }
+    none(found);
+    assert_eq!(source::own_dependencies("player-host"), ["cubist-core", "cubist-baker"], "the manifests are read as they should be");
+}
+
+#[test]
+fn the_core_has_no_floats() {
+    let mut found = Vec::new();
+    for source in source::below("core/src/") {
+        let code = source.code_without_tests();
+        let floats = source::words(&code).filter(|(_, word)| matches!(*word, "f16" | "f32" | "f64" | "f128"));
+        found.extend(floats.map(|(at, word)| format!("{}:{}: {word}", source.path, source::line(&code, at))));
+    }
+    none(found);
+}
+
+#[test]
+fn the_core_imports_downwards() {
+    let sources = source::below("core/src/");
+    let module = |source: &Source| source.path["core/src/".len()..].trim_end_matches(".rs").split('/').next().unwrap_or("").to_owned();
+    let place = |name: &str| ORDER.iter().position(|&m| m == name);
+    let library = sources.iter().find(|s| s.path == "core/src/lib.rs").expect("the core has a lib.rs");
+    let reexports: BTreeMap<String, String> = source::reexports(&library.code()).into_iter().collect();
+    let mut found = Vec::new();
+    for source in sources.iter().filter(|s| s.path != library.path) {
+        let name = module(source);
+        let Some(own) = place(&name) else {
+            found.push(format!("{}: has no place in ORDER of tests/tests/architecture.rs", source.path));
+            continue;
+        };
+        for import in source::imports(&source.code_without_tests()) {
+            let target = reexports.get(&import).unwrap_or(&import);
+            match place(target) {
+                None => found.push(format!("{}: crate::{import} is no module of ORDER", source.path)),
+                Some(at) if at > own => found.push(format!("{}: imports {target}, which stands above it", source.path)),
+                Some(_) => {}
+            }
+        }
+    }
+    none(found);
+    assert_eq!(reexports.get("Bundle").map(String::as_str), Some("bundle"), "the re-exports are read as they should be");
+}
+
+#[test]
+fn ci_runs_what_the_readme_promises() {
+    let (readme, ci) = (source::file("README.md"), source::file(".ci/run"));
+    assert!(readme.contains("\ncargo test --workspace\n"), "the README's test command has changed");
+    assert!(ci.contains("cargo test --workspace\n"), ".ci/run does not run the README's test command");
+    assert!(readme.contains("\ncargo run --release\n"), "the README's demo command has changed");
+}
