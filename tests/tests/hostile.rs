@@ -341,11 +341,10 @@ fn lists_of_noise_hold_known_tests_and_labels_only() {
 }
 
 #[test]
-fn a_test_that_is_none_plays_as_both() {
-    // Nothing decodes to it; should one ever stand there, no index or match may depend on it.
+fn the_last_of_nine_sheets_has_no_test() {
     let sheets = SheetsRef { labels: &[0; 9], tests: 0xffff };
     assert!((0..8).all(|index| sheets.test(index) == 3));
-    assert_eq!(sheets.test(8), CHART, "the last of nine sheets has no test");
+    assert_eq!(sheets.test(8), CHART, "sixteen bits hold eight tests");
 }
 
 #[test]
