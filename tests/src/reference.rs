@@ -184,13 +184,14 @@ impl<'a> Reference<'a> {
         let moment = self.moment(frame, weights);
         let (width, height) = self.bundle.size();
         let size = 1u32 << self.grid.log2;
+        let (columns, rows) = (self.grid.columns, self.grid.rows);
+        let cells: Vec<Vec<Sheet>> = (0..columns * rows).map(|cell| self.sheets(&moment, cell % columns, cell / columns)).collect();
         let mut picture = Vec::new();
         for y in 0..height {
             for x in 0..width {
-                let (column, row) = ((x / size) as usize, (y / size) as usize);
-                let sheets = self.sheets(&moment, column, row);
+                let cell = (y / size) as usize * columns + (x / size) as usize;
                 let within = [x % size, y % size].map(|offset| f64::from(offset) / f64::from(size));
-                picture.push(self.pixel(&sheets, within));
+                picture.push(self.pixel(&cells[cell], within));
             }
         }
         picture

@@ -168,7 +168,7 @@ fn changed_bytes_with_a_matching_checksum_never_panic() {
     let mut random = Random(1);
     let texels = range(ATLAS);
     let mut played = 0;
-    for round in 0..20_000 {
+    for round in 0..12_000 {
         let mut bytes = sound().to_vec();
         let everywhere = 0..bytes.len() - 4;
         // Texels are the most bytes and the dullest: most changes go to headers, labels and keys.
@@ -184,7 +184,7 @@ fn changed_bytes_with_a_matching_checksum_never_panic() {
         played += usize::from(survives(&bytes));
     }
     // If nearly all were refused, the test would say little about playing.
-    assert!((4_000..19_000).contains(&played), "{played} of 20000 played");
+    assert!((2_400..11_400).contains(&played), "{played} of 12000 played");
 }
 
 proptest! {
