@@ -36,11 +36,8 @@ impl SheetsRef<'_> {
     /// The test of the sheet at `index`, front to back.
     #[must_use]
     pub const fn test(&self, index: usize) -> u16 {
-        // The ninth sheet is always a last one: it has no bits, and must not read the first one's.
-        match self.tests.checked_shr((index as u32).wrapping_mul(2)) {
-            Some(bits) => bits & 3,
-            None => CHART,
-        }
+        // Wider than the tests: the last of MAX_SHEETS sheets has none, and must not come by the first one's.
+        ((self.tests as u32).wrapping_shr((index as u32).wrapping_mul(2)) & 3) as u16
     }
 }
 
@@ -64,12 +61,20 @@ pub struct Lists<'m> {
     /// Where each row of cells starts in `data`; one entry more than rows.
     rows: &'m mut [u16],
     data: &'m mut [u8],
+    /// Sheets that a cell may hold.
+    most: usize,
 }
 
 impl<'m> Lists<'m> {
     /// Lists in `rows` (one entry more than the grid has rows) and `data`.
     pub fn new(rows: &'m mut [u16], data: &'m mut [u8]) -> Self {
-        Self { rows, data }
+        Self { rows, data, most: MAX_SHEETS }
+    }
+
+    /// The same lists with at most `sheets` a cell: what is coded beyond that is left out, whatever the bytes say.
+    #[must_use]
+    pub fn at_most(self, sheets: u8) -> Self {
+        Self { most: usize::from(sheets), ..self }
     }
 
     /// A cursor at the first cell of `row`; an empty one past the last row.
@@ -89,7 +94,7 @@ impl<'m> Lists<'m> {
     }
 
     fn push(&mut self, end: usize, sheets: &Sheets) -> usize {
-        let labels = sheets.labels.as_slice();
+        let labels = sheets.labels.get(..self.most).unwrap_or(&sheets.labels);
         let next = end.saturating_add(bytes(labels.len()));
         let Some((count, rest)) = self.data.get_mut(end..next).and_then(<[u8]>::split_first_mut) else {
             // A list that breaks its own bound is cut off: the cells after it show nothing.
@@ -273,17 +278,5 @@ impl<B: Bits> Coder<'_, B> {
         let width = usize::BITS.wrapping_sub(self.labels.saturating_sub(1).leading_zeros());
         let label = self.bits.flat(width, u32::from(want)) as usize;
         label.min(self.labels.saturating_sub(1)) as u8
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn eight_sheets_have_tests_and_the_ninth_has_none() {
-        let sheets = SheetsRef { labels: &[0, 1, 2, 3, 4, 5, 6, 7, 8], tests: BOTH << 14 | FIELD };
-        let tests = core::array::from_fn(|index| sheets.test(index));
-        assert_eq!(tests, [FIELD, CHART, CHART, CHART, CHART, CHART, CHART, BOTH, CHART]);
     }
 }
