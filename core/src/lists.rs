@@ -36,7 +36,8 @@ impl SheetsRef<'_> {
     /// The test of the sheet at `index`, front to back.
     #[must_use]
     pub const fn test(&self, index: usize) -> u16 {
-        self.tests.wrapping_shr((index as u32).wrapping_mul(2)) & 3
+        // Wider than the tests: the last of MAX_SHEETS sheets has none, and must not come by the first one's.
+        ((self.tests as u32).wrapping_shr((index as u32).wrapping_mul(2)) & 3) as u16
     }
 }
 
@@ -60,12 +61,20 @@ pub struct Lists<'m> {
     /// Where each row of cells starts in `data`; one entry more than rows.
     rows: &'m mut [u16],
     data: &'m mut [u8],
+    /// Sheets that a cell may hold.
+    most: usize,
 }
 
 impl<'m> Lists<'m> {
     /// Lists in `rows` (one entry more than the grid has rows) and `data`.
     pub fn new(rows: &'m mut [u16], data: &'m mut [u8]) -> Self {
-        Self { rows, data }
+        Self { rows, data, most: MAX_SHEETS }
+    }
+
+    /// The same lists with at most `sheets` a cell: what is coded beyond that is left out, whatever the bytes say.
+    #[must_use]
+    pub fn at_most(self, sheets: u8) -> Self {
+        Self { most: usize::from(sheets), ..self }
     }
 
     /// A cursor at the first cell of `row`; an empty one past the last row.
@@ -85,7 +94,7 @@ impl<'m> Lists<'m> {
     }
 
     fn push(&mut self, end: usize, sheets: &Sheets) -> usize {
-        let labels = sheets.labels.as_slice();
+        let labels = sheets.labels.get(..self.most).unwrap_or(&sheets.labels);
         let next = end.saturating_add(bytes(labels.len()));
         let Some((count, rest)) = self.data.get_mut(end..next).and_then(<[u8]>::split_first_mut) else {
             // A list that breaks its own bound is cut off: the cells after it show nothing.

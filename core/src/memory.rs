@@ -66,7 +66,10 @@ fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
             }),
             slots,
             turn: 0,
-            lists: core::array::from_fn(|_| Lists::new(cutter.take(one_more(grid.rows)), cutter.take(usize::from(limits.list_bytes)))),
+            lists: core::array::from_fn(|_| {
+                let (rows, data) = (cutter.take(one_more(grid.rows)), cutter.take(usize::from(limits.list_bytes)));
+                Lists::new(rows, data).at_most(limits.cell_sheets)
+            }),
         },
         rows: core::array::from_fn(|_| NodeRow {
             start: cutter.take(one_more(grid.node_columns())),

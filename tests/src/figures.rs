@@ -3,8 +3,8 @@
 
 use crate::play;
 use anyhow::Result;
-use cubist_baker::atlas::Atlas;
-use cubist_core::Player;
+use cubist_baker::atlas::{Atlas, Label};
+use cubist_core::{Bundle, Player};
 use std::time::Instant;
 
 /// A bundle played against exact ray casting of every pixel through the same source image.
@@ -27,12 +27,24 @@ pub fn widen(colour: u16) -> [u8; 3] {
     [(r << 3 | r >> 2) as u8, (g << 2 | g >> 4) as u8, (b << 3 | b >> 2) as u8]
 }
 
+/// For every label of `bundle` the label of `atlas` with the same chart: a folded surface has several (see `cubist_baker::folds`).
+fn charts(bundle: &Bundle<'_>, atlas: &Atlas) -> Vec<usize> {
+    let labels = &atlas.image.labels;
+    let chart = |label: usize| {
+        let own = bundle.label(label as u8);
+        let same = |other: &Label| other.rect == [own.left, own.top, own.right, own.bottom];
+        if label < labels.len() { label } else { labels.iter().position(same).unwrap_or(label) }
+    };
+    (0..bundle.label_count()).map(chart).collect()
+}
+
 /// Compares all frames of a bundle with the G-buffer of `atlas`.
 ///
 /// # Errors
 /// The bundle does not parse.
 pub fn quality(bytes: &[u8], atlas: &Atlas) -> Result<Quality> {
     let (image, gbuffer) = (&atlas.image, &atlas.gbuffer);
+    let charts = charts(&Bundle::parse(bytes)?, atlas);
     let size = (gbuffer.width * gbuffer.height) as usize;
     let (mut sum, mut least, mut wrong, mut torn) = (0.0f64, f64::INFINITY, 0u64, 0u64);
     play::visit(bytes, 0..gbuffer.frames, |frame, player| {
@@ -47,7 +59,7 @@ pub fn quality(bytes: &[u8], atlas: &Atlas) -> Result<Quality> {
         (sum, least) = (sum + psnr, least.min(psnr));
         torn += u64::from(player.work().torn_pixels);
         let labels = play::probes(player).into_iter().zip(&gbuffer.label[exact]);
-        wrong += labels.filter(|(probe, label)| u16::from(probe.label) != **label).count() as u64;
+        wrong += labels.filter(|(probe, label)| charts[usize::from(probe.label)] != usize::from(**label)).count() as u64;
     })?;
     let percent = |count: u64| 100.0 * count as f64 / gbuffer.label.len() as f64;
     Ok(Quality {

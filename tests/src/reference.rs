@@ -5,15 +5,19 @@
 use cubist_core::Bundle;
 use cubist_core::coder::{Decoder, Probability};
 use cubist_core::fixed::ONE;
-use cubist_core::format::{MASK, MASKED, TIME_CUBIC, TIME_HOLD};
+use cubist_core::format::{MASK, MASKED, STRIP, TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
 use cubist_core::grid::Grid;
 use cubist_core::key::{self, Key, Nothing, Trace};
-use cubist_core::lists::{self, Lists};
+use cubist_core::lists::{self, CHART, FIELD, Lists};
 use cubist_core::record::{LISTS, MAX_KEYS, Shape, Stream};
 use cubist_core::timeline;
 
-/// How near the edge of the source image a node's position may come, texels (FORMAT.md: 32 / 65536).
-const EDGE: f64 = 32.0 / 65_536.0;
+/// The last position inside the source image is this far from its right and its lower edge, texels.
+const EDGE: f64 = 1.0 / 65_536.0;
+/// Stored coordinates count in this part of a texel.
+const STORED: f64 = 1.0 / 32.0;
+/// Stored distances count in this part of a pixel.
+const DISTANCE: f64 = 1.0 / 256.0;
 
 /// What the keys around a frame weigh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,7 +33,7 @@ pub type Four = [f64; 4];
 
 /// The exact weights at `t` (0..=1) of an interval of `lengths[1]` frames between intervals of `lengths[0]` and `lengths[2]`, where
 /// `missing` tells which of the outer keys carry no layer: a cubic Hermite curve through the inner two, with the secants over two
-/// intervals as tangents; with the interval's own secant where a key is missing.
+/// intervals as tangents. A missing key's tangent is the one that leaves no cubic term; without both the curve is straight.
 #[must_use]
 pub fn weights(time: u8, lengths: [u32; 3], t: f64, missing: [bool; 2]) -> Four {
     match time {
@@ -40,31 +44,30 @@ pub fn weights(time: u8, lengths: [u32; 3], t: f64, missing: [bool; 2]) -> Four 
         _ => return [0.0, 1.0 - t, t, 0.0],
     }
     let [before, length, after] = lengths.map(f64::from);
-    let (leaving, arriving) = (t * (1.0 - t) * (1.0 - t), t * t * (t - 1.0));
-    let value = t * t * (3.0 - 2.0 * t);
-    let mut weights = [0.0, 1.0 - value, value, 0.0];
-    let mut tangent = |amount: f64, from: usize, to: usize, frames: f64| {
-        weights[from] -= amount * length / frames;
-        weights[to] += amount * length / frames;
+    // What the keys weigh in the values at both ends, their difference, and the tangents there, an interval long.
+    let (start, end, difference) = ([0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [0.0, -1.0, 1.0, 0.0]);
+    let secants: [Four; 2] =
+        [[-1.0, 0.0, 1.0, 0.0].map(|x| x * length / (before + length)), [0.0, -1.0, 0.0, 1.0].map(|x| x * length / (length + after))];
+    // A parabola's tangents at both ends add up to twice the difference.
+    let other = |tangent: Four| [0, 1, 2, 3].map(|key: usize| 2.0 * difference[key] - tangent[key]);
+    let [leaving, arriving] = match missing {
+        [false, false] => secants,
+        [true, false] => [other(secants[1]), secants[1]],
+        [false, true] => [secants[0], other(secants[0])],
+        [true, true] => [difference; 2],
     };
-    if missing[0] {
-        tangent(leaving, 1, 2, length)
-    } else {
-        tangent(leaving, 0, 2, before + length)
-    };
-    if missing[1] {
-        tangent(arriving, 1, 2, length)
-    } else {
-        tangent(arriving, 1, 3, length + after)
-    };
-    weights
+    [0, 1, 2, 3].map(|key: usize| {
+        let value = t * t * (3.0 - 2.0 * t);
+        start[key] * (1.0 - value) + end[key] * value + leaving[key] * t * (1.0 - t) * (1.0 - t) + arriving[key] * t * t * (t - 1.0)
+    })
 }
 
-/// A layer of a node: a label and its position in the source image, texels.
+/// A layer of a node: a label, its position in the source image, texels, and its fields, pixels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Layer {
     label: u8,
     at: [f64; 2],
+    fields: [f64; 2],
 }
 
 /// One pixel.
@@ -72,15 +75,19 @@ struct Layer {
 pub struct Pixel {
     /// The label of the sheet that shows.
     pub label: u8,
-    /// Its position in the source image, texels.
+    /// Its position in the source image, texels, brought to the nearest one inside.
     pub at: [f64; 2],
     /// RGB565.
     pub colour: u16,
     /// How far apart the keys of any corner that was looked at are, texels.
     pub motion: f64,
     /// How near any position that was looked at is to an edge between texels, texels: rounding can only change the pixel
-    /// where this is small.
+    /// where this is small,
     pub margin: f64,
+    /// or where this is: how near any field that was looked at is to zero, pixels.
+    pub outline: f64,
+    /// How far such a field goes from key to key at any corner, pixels.
+    pub shift: f64,
 }
 
 /// All keys of a bundle, decoded.
@@ -89,8 +96,8 @@ pub struct Reference<'a> {
     grid: Grid,
     /// For every key the nodes' layers.
     keys: Vec<Vec<Vec<Layer>>>,
-    /// For every interval the cells' labels, front to back.
-    lists: Vec<Vec<Vec<u8>>>,
+    /// For every interval the cells' labels and their tests, front to back.
+    lists: Vec<Vec<Vec<(u8, u16)>>>,
     mask: &'a [u8],
 }
 
@@ -103,14 +110,15 @@ impl<'a> Reference<'a> {
         let layers = usize::from(limits.key_layers);
         let mut contexts = [vec![Probability::NEW; lists::CONTEXTS], vec![Probability::NEW; key::CONTEXTS]];
         let mut traces = vec![Trace::default(); 2 * usize::from(limits.row_layers)];
-        let mut key_memory: [_; MAX_KEYS] = std::array::from_fn(|_| (vec![0; grid.nodes() + 1], vec![0; layers], vec![0; layers]));
+        let mut key_memory: [_; MAX_KEYS] =
+            std::array::from_fn(|_| (vec![0; grid.nodes() + 1], vec![0; layers], vec![0; layers], [vec![0; layers], vec![0; layers]]));
         let mut list_memory: [_; LISTS] = std::array::from_fn(|_| (vec![0; grid.rows + 1], vec![0; usize::from(limits.list_bytes)]));
         let [list_contexts, key_contexts] = &mut contexts;
         let mut stream = Stream {
             list_contexts,
             key_contexts,
             traces: &mut traces,
-            keys: key_memory.each_mut().map(|(start, label, uv)| Key { start, label, uv }),
+            keys: key_memory.each_mut().map(|(start, label, uv, [a, b])| Key { start, label, uv, fields: [a, b] }),
             lists: list_memory.each_mut().map(|(rows, data)| Lists::new(rows, data)),
             slots: MAX_KEYS,
             turn: 0,
@@ -163,7 +171,11 @@ impl<'a> Reference<'a> {
                 timeline::weights(time, lengths, passed)[set].map(|weight| f64::from(weight) / f64::from(ONE))
             }
         };
-        Moment { keys, weights: [[false, false], [true, false], [false, true], [true, true]].map(weights), interval: from }
+        let linear = match kind {
+            Weights::Exact => self::weights(time.min(TIME_LINEAR), lengths, f64::from(passed) / f64::from(lengths[1]), [false; 2])[2],
+            Weights::Player => f64::from(timeline::weights(time.min(TIME_LINEAR), lengths, passed)[0][2]) / f64::from(ONE),
+        };
+        Moment { keys, weights: [[false, false], [true, false], [false, true], [true, true]].map(weights), linear, interval: from }
     }
 
     /// Renders `frame`, row by row; `None` at pixels that no sheet shows at, of which a sound bundle has none.
@@ -172,13 +184,14 @@ impl<'a> Reference<'a> {
         let moment = self.moment(frame, weights);
         let (width, height) = self.bundle.size();
         let size = 1u32 << self.grid.log2;
+        let (columns, rows) = (self.grid.columns, self.grid.rows);
+        let cells: Vec<Vec<Sheet>> = (0..columns * rows).map(|cell| self.sheets(&moment, cell % columns, cell / columns)).collect();
         let mut picture = Vec::new();
         for y in 0..height {
             for x in 0..width {
-                let (column, row) = ((x / size) as usize, (y / size) as usize);
-                let sheets = self.sheets(&moment, column, row);
+                let cell = (y / size) as usize * columns + (x / size) as usize;
                 let within = [x % size, y % size].map(|offset| f64::from(offset) / f64::from(size));
-                picture.push(self.pixel(&sheets, within));
+                picture.push(self.pixel(&cells[cell], within));
             }
         }
         picture
@@ -189,51 +202,73 @@ impl<'a> Reference<'a> {
         let nodes = self.grid.columns + 1;
         let corner = row * nodes + column;
         let corners = [corner, corner + 1, corner + nodes, corner + nodes + 1];
-        let labels = &self.lists[moment.interval][row * self.grid.columns + column];
-        labels.iter().filter_map(|&label| self.sheet(moment, corners, label)).collect()
+        let listed = &self.lists[moment.interval][row * self.grid.columns + column];
+        listed.iter().filter_map(|&(label, test)| self.sheet(moment, corners, label, test)).collect()
     }
 
     /// The sheet of `label` between nodes; `None` where one carries no such layer.
-    fn sheet(&self, moment: &Moment, nodes: [usize; 4], label: u8) -> Option<Sheet> {
-        let limit = [1u32 << self.bundle.atlas().width_log2, u32::from(self.bundle.atlas().height)].map(f64::from);
-        let mut sheet = Sheet { label, corners: [[0.0; 2]; 4], motion: 0.0 };
-        for (node, place) in nodes.into_iter().zip(&mut sheet.corners) {
-            let layers = moment.keys.map(|key| self.keys[key?][node].iter().find(|layer| layer.label == label).map(|layer| layer.at));
-            let start = layers[1]?;
-            layers[2]?;
+    fn sheet(&self, moment: &Moment, nodes: [usize; 4], label: u8, test: u16) -> Option<Sheet> {
+        let mut sheet = Sheet { label, test, corners: [[0.0; 2]; 4], motion: 0.0, fields: [[0.0; 2]; 4], shift: 0.0 };
+        for (corner, node) in nodes.into_iter().enumerate() {
+            let layers = moment.keys.map(|key| self.keys[key?][node].iter().find(|layer| layer.label == label));
+            let (start, end) = (layers[1]?, layers[2]?);
             let weights = moment.weights[usize::from(layers[0].is_none()) + 2 * usize::from(layers[3].is_none())];
             for axis in 0..2 {
-                let values = layers.map(|layer| layer.map_or(0.0, |at| at[axis]));
-                let now: f64 = values.iter().zip(weights).map(|(value, weight)| value * weight).sum();
-                place[axis] = now.clamp(EDGE, limit[axis] - EDGE);
-                let apart = layers.iter().flatten().map(|at| (at[axis] - start[axis]).abs());
+                let weighted = layers.iter().zip(weights).map(|(layer, weight)| layer.map_or(0.0, |layer| layer.at[axis] * weight));
+                sheet.corners[corner][axis] = weighted.sum();
+                let apart = layers.iter().flatten().map(|layer| (layer.at[axis] - start.at[axis]).abs());
                 sheet.motion = apart.fold(sheet.motion, f64::max);
+                let [from, to] = [start, end].map(|layer| layer.fields[axis]);
+                sheet.fields[corner][axis] = from + (to - from) * moment.linear;
+                sheet.shift = sheet.shift.max((to - from).abs());
             }
         }
         Some(sheet)
     }
 
-    /// The first sheet whose chart covers the place `within` the cell; the last one needs no chart.
+    /// The first sheet whose test lets it show at the place `within` the cell; the last one needs no test.
     fn pixel(&self, sheets: &[Sheet], within: [f64; 2]) -> Option<Pixel> {
-        let (mut motion, mut margin) = (0.0f64, f64::INFINITY);
+        let size = self.size();
+        let (mut motion, mut margin, mut outline, mut shift) = (0.0f64, f64::INFINITY, f64::INFINITY, 0.0f64);
         for (index, sheet) in sheets.iter().enumerate() {
-            let at = sheet.position(within);
+            let at = bilinear(&sheet.corners, within);
+            let last = index + 1 == sheets.len();
+            let mut shows = true;
+            if !last && sheet.test != CHART {
+                let [a, b] = bilinear(&sheet.fields, within);
+                let strip = self.bundle.label(sheet.label).flags & STRIP != 0;
+                let least = if strip { a.min(b) } else { a };
+                (outline, shift) = (outline.min(least.abs()), shift.max(sheet.shift));
+                shows &= least > 0.0;
+            }
+            if !last && sheet.test != FIELD {
+                shows &= self.covers(sheet.label, at);
+            }
             motion = motion.max(sheet.motion);
-            margin = at.iter().map(|x| (x - x.round()).abs()).fold(margin, f64::min);
-            if index + 1 == sheets.len() || self.covers(sheet.label, at) {
-                return Some(Pixel { label: sheet.label, at, colour: self.colour(at), motion, margin });
+            // Outside the picture no edge is nearer than the picture's own.
+            margin = at.iter().zip(size).map(|(x, size)| (x - x.round().clamp(0.0, size)).abs()).fold(margin, f64::min);
+            if last || shows {
+                let at = [0, 1].map(|axis: usize| at[axis].clamp(0.0, size[axis] - EDGE));
+                return Some(Pixel { label: sheet.label, at, colour: self.colour(at), motion, margin, outline, shift });
             }
         }
         None
     }
 
+    /// Width and height of the source image, texels.
+    fn size(&self) -> [f64; 2] {
+        [1u32 << self.bundle.atlas().width_log2, u32::from(self.bundle.atlas().height)].map(f64::from)
+    }
+
     /// Whether the chart of `label` covers `at`: inside the rectangle and, where the label has a mask, on a texel of the chart.
     fn covers(&self, label: u8, [u, v]: [f64; 2]) -> bool {
         let record = self.bundle.label(label);
-        let inside =
-            u >= f64::from(record.left) && u < f64::from(record.right) && v >= f64::from(record.top) && v < f64::from(record.bottom);
+        let [left, top, right, bottom] = [record.left, record.top, record.right, record.bottom].map(f64::from);
+        if !((left..right).contains(&u) && (top..bottom).contains(&v)) {
+            return false;
+        }
         let index = self.texel([u, v]);
-        inside && (record.flags & MASKED == 0 || self.mask[index / 8] & 1 << (index % 8) != 0)
+        record.flags & MASKED == 0 || self.mask[index / 8] & 1 << (index % 8) != 0
     }
 
     fn colour(&self, at: [f64; 2]) -> u16 {
@@ -255,45 +290,52 @@ struct Moment {
     keys: [Option<usize>; 4],
     /// By which of the outer two carry no layer: neither, the first, the last, both.
     weights: [Four; 4],
+    /// What the end of the interval weighs where time is straight.
+    linear: f64,
 }
 
 /// A sheet of a cell at one moment: corners top left, top right, bottom left, bottom right.
 struct Sheet {
     label: u8,
+    test: u16,
     corners: [[f64; 2]; 4],
     motion: f64,
+    fields: [[f64; 2]; 4],
+    shift: f64,
 }
 
-impl Sheet {
-    /// Bilinear over the cell.
-    fn position(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let [a, b, c, d] = self.corners;
-        [0, 1].map(|axis: usize| {
-            let left = a[axis] + (c[axis] - a[axis]) * y;
-            let right = b[axis] + (d[axis] - b[axis]) * y;
-            left + (right - left) * x
-        })
-    }
+/// The value `x` and `y` of the way through a cell, from those at its corners.
+fn bilinear([a, b, c, d]: &[[f64; 2]; 4], [x, y]: [f64; 2]) -> [f64; 2] {
+    [0, 1].map(|axis: usize| {
+        let left = a[axis] + (c[axis] - a[axis]) * y;
+        let right = b[axis] + (d[axis] - b[axis]) * y;
+        left + (right - left) * x
+    })
 }
 
 /// The layers of every node of a key.
 fn nodes(key: &Key<'_>, grid: Grid) -> Vec<Vec<Layer>> {
+    let layer = |index: usize, label: u8| Layer {
+        label,
+        at: [key.uv(index).u(), key.uv(index).v()].map(|x| f64::from(x) * STORED),
+        fields: key.field(index).map(|distance| f64::from(distance) * DISTANCE),
+    };
     (0..grid.nodes())
         .map(|node| {
             let (first, labels) = key.node(node);
-            let at = |index: usize| [key.uv(index).u(), key.uv(index).v()].map(|x| f64::from(x) / 64.0);
-            (first..).zip(labels).map(|(index, &label)| Layer { label, at: at(index) }).collect()
+            (first..).zip(labels).map(|(index, &label)| layer(index, label)).collect()
         })
         .collect()
 }
 
-/// The labels of every cell of an interval, front to back.
-fn cells(lists: &Lists<'_>, grid: Grid) -> Vec<Vec<u8>> {
+/// The labels of every cell of an interval and their tests, front to back.
+fn cells(lists: &Lists<'_>, grid: Grid) -> Vec<Vec<(u8, u16)>> {
     let mut cells = Vec::new();
     for row in 0..grid.rows {
         let mut cursor = lists.row(row);
         for _ in 0..grid.columns {
-            cells.push(lists.sheets(cursor).to_vec());
+            let sheets = lists.sheets(cursor);
+            cells.push(sheets.labels.iter().enumerate().map(|(index, &label)| (label, sheets.test(index))).collect());
             cursor = cursor.next(lists);
         }
     }

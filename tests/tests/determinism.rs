@@ -9,7 +9,7 @@ use rayon::ThreadPoolBuilder;
 const FRAMES: u32 = 24;
 
 fn bake(name: &str) -> Vec<u8> {
-    scenes::bundle(name, [96, 72], FRAMES, &Settings { key_interval: 5, ..Settings::default() }).expect("a built-in scene bakes")
+    scenes::bundle(name, [80, 60], FRAMES, &Settings { key_interval: 5, ..Settings::default() }).expect("a built-in scene bakes")
 }
 
 fn bake_on(threads: usize, name: &str) -> Vec<u8> {

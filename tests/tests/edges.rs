@@ -47,10 +47,10 @@ fn dense() -> Settings {
 #[test]
 fn screens_of_any_shape_play() {
     // The field of view is that of the height: a screen 300 pixels wide and 1 high looks to all sides at once.
-    for (size, least) in [([1, 1], 22.0), ([2, 300], 22.0), ([300, 1], 18.0), ([128, 64], 20.0), ([240, 240], 20.0), ([120, 200], 20.0)] {
+    for (size, least) in [([1, 1], 90.0), ([2, 300], 32.0), ([300, 1], 24.0), ([128, 64], 21.3), ([240, 240], 27.2), ([120, 200], 25.8)] {
         let (_, quality) = check(&street(size, 5), &dense());
         assert!(quality.psnr_mean > least, "{size:?}: {quality:?}");
-        assert!(quality.wrong_surface_percent < 3.0 || size[1] == 1, "{size:?}: {quality:?}");
+        assert!(quality.wrong_surface_percent < if size[1] == 1 { 5.0 } else { 1.0 }, "{size:?}: {quality:?}");
     }
 }
 
@@ -60,16 +60,16 @@ fn paths_of_one_to_three_frames_play_nearly_as_they_were_cast() {
         let mut scene = street(scenes::SIZE, frames);
         scene.playback.looping = looping;
         let (_, quality) = check(&scene, &dense());
-        assert!(quality.psnr_mean > 21.0 && quality.wrong_surface_percent < 3.0, "{frames} frames, looping {looping}: {quality:?}");
+        assert!(quality.psnr_mean > 23.8 && quality.wrong_surface_percent < 0.7, "{frames} frames, looping {looping}: {quality:?}");
     }
 }
 
 #[test]
 fn every_cell_and_key_interval_plays() {
     let scene = street([70, 50], 12);
-    for (cell, key_interval) in [(4, 1), (8, 256), (16, 3), (32, 11), (32, 12)] {
-        let (_, quality) = check(&scene, &Settings { cell, key_interval, ..Settings::default() });
-        assert!(quality.psnr_mean > 10.0, "cell {cell}, keys every {key_interval}: {quality:?}");
+    for (cell, key_interval, least) in [(4, 1, 21.8), (8, 256, 18.7), (16, 3, 17.8), (32, 11, 16.0), (32, 12, 16.0)] {
+        let (_, quality) = check(&scene, &Settings { cell, key_interval, least_pixels: 1, ..Settings::default() });
+        assert!(quality.psnr_mean > least && quality.wrong_surface_percent < 7.0, "cell {cell}, keys every {key_interval}: {quality:?}");
     }
 }
 
@@ -87,7 +87,10 @@ fn a_camera_that_stands_still_shows_one_picture() {
     let mut scene = street(scenes::SIZE, 20);
     scene.camera = Arc::new(Still(scene.camera.pose(0.3)));
     let (still, quality) = check(&scene, &Settings::default());
-    assert!(quality.psnr_mean > 20.0, "{quality:?}");
+    assert!(quality.psnr_mean > 23.8 && quality.wrong_surface_percent < 0.5, "{quality:?}");
+    // What is left is perspective within a cell: cells half as large have a quarter of the error.
+    let (_, finer) = check(&scene, &Settings { cell: 4, ..Settings::default() });
+    assert!(finer.psnr_mean > quality.psnr_mean + 2.0, "{finer:?}");
     let frames = play::frames(&still, 0..20).expect("it plays");
     let different = |picture: &[u16]| picture.iter().zip(&frames[0]).filter(|(a, b)| a != b).count();
     let most = frames.iter().map(|picture| different(picture)).max().unwrap_or(0);
@@ -135,7 +138,7 @@ fn one_triangle_in_front_of_nothing_plays() {
     scene.camera = Arc::new(Still(pose));
     scene.triangles.push(triangle);
     let (_, quality) = check(&scene, &Settings::default());
-    assert!(quality.psnr_mean > 24.0 && quality.wrong_surface_percent < 1.0, "{quality:?}");
+    assert!(quality.psnr_mean > 27.0 && quality.wrong_surface_percent < 0.5, "{quality:?}");
 }
 
 #[test]

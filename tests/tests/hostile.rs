@@ -2,10 +2,16 @@
 //! same pixels whatever the memory held. First layer: cuts, changed bytes, changed fields; what a fuzzer finds comes on top.
 
 use cubist_baker::bake::Settings;
-use cubist_core::format::{ATLAS, Atlas, Envelope, KeyEntry, LABEL_BYTES, LABELS, LabelRecord, Limits, PATH, Path, Section};
+use cubist_core::coder::{Bits, Probability};
+use cubist_core::format::{
+    ATLAS, Atlas, Envelope, FIXED, KNOWN_FLAGS, KeyEntry, LABEL_BYTES, LABELS, LabelRecord, Limits, MASKED, PATH, Path, STRIP, Section,
+};
+use cubist_core::grid::Grid;
+use cubist_core::lists::{self, BOTH, CHART, FIELD, Lists, Sheets, SheetsRef};
 use cubist_core::{Bundle, BundleError, Frame, MemoryError, Player, checksum};
 use cubist_tests::scenes;
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use std::sync::OnceLock;
 
 /// A small bundle with several labels, a mask, torn cells and dependent keys.
@@ -18,7 +24,8 @@ fn sound() -> &'static [u8] {
         let copy = bytes.clone();
         let bundle = Bundle::parse(&copy).expect("the baker's bytes parse");
         assert!(bundle.sections().any(|section| section.tag == *b"MASK"), "a mask belongs to the test");
-        assert!(bundle.limits().cell_sheets > 1, "torn cells belong to the test");
+        assert!(bundle.limits().cell_sheets > 2, "torn cells belong to the test");
+        assert!(bundle.limits().fields == 2, "strips belong to the test");
         println!("{} bytes, {:?}, {} labels, {} keys", bytes.len(), bundle.limits(), bundle.label_count(), bundle.key_count());
         assert!((0..bundle.key_count()).any(|key| !bundle.key(key).independent), "dependent keys belong to the test");
         bytes
@@ -161,7 +168,7 @@ fn changed_bytes_with_a_matching_checksum_never_panic() {
     let mut random = Random(1);
     let texels = range(ATLAS);
     let mut played = 0;
-    for round in 0..20_000 {
+    for round in 0..12_000 {
         let mut bytes = sound().to_vec();
         let everywhere = 0..bytes.len() - 4;
         // Texels are the most bytes and the dullest: most changes go to headers, labels and keys.
@@ -177,26 +184,26 @@ fn changed_bytes_with_a_matching_checksum_never_panic() {
         played += usize::from(survives(&bytes));
     }
     // If nearly all were refused, the test would say little about playing.
-    assert!((4_000..19_000).contains(&played), "{played} of 20000 played");
+    assert!((2_400..11_400).contains(&played), "{played} of 12000 played");
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 2_000, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 2_000, failure_persistence: None, rng_seed: RngSeed::Fixed(1), ..ProptestConfig::default() })]
 
     #[test]
     fn any_limits_and_sizes_play_or_are_refused(
         size in (0u16..80, 0u16..80),
         grid in (1u8..7, 0u8..3, 0u8..6),
-        limits in (any::<[u16; 5]>(), 0u8..14, 0u32..5),
+        limits in (any::<[u16; 5]>(), 0u8..14, 0u8..4, 0u32..5),
         frames in (0u32..20, any::<bool>()),
     ) {
         survives(&with_path(|path| {
-            let (values, cell_sheets, shift) = limits;
+            let (values, cell_sheets, fields, shift) = limits;
             let [key_layers, row_layers, list_bytes, row_sheets, seek_keys] = values.map(|x| x >> (3 * shift));
             (path.width, path.height) = size;
             (path.cell_log2, path.time, path.step_log2) = grid;
             (path.frames, path.looping) = frames;
-            path.limits = Limits { key_layers, row_layers, list_bytes, row_sheets, cell_sheets, seek_keys };
+            path.limits = Limits { key_layers, row_layers, list_bytes, row_sheets, cell_sheets, fields, seek_keys };
         }));
     }
 
@@ -218,7 +225,7 @@ proptest! {
             let mut label = LabelRecord::from_bytes(bytes);
             if tame {
                 (label.left, label.top, label.right, label.bottom) = (label.left % 30, label.top % 30, 30 + label.right % 30, 30 + label.bottom % 30);
-                label.flags %= 3;
+                label.flags = if label.flags & FIXED == 0 { label.flags & KNOWN_FLAGS } else { label.flags & (FIXED | STRIP) };
             }
             label.to_bytes()
         }).collect();
@@ -229,12 +236,14 @@ proptest! {
 #[test]
 fn limits_that_are_too_low_leave_pixels_out_but_play() {
     let halve = |x: &mut u16| *x /= 2;
-    let changes: [fn(&mut Limits); 6] = [
+    let changes: [fn(&mut Limits); 8] = [
         |limits| limits.key_layers /= 2,
         |limits| limits.row_layers /= 2,
         |limits| limits.list_bytes /= 2,
         |limits| limits.row_sheets /= 2,
         |limits| limits.cell_sheets = 1,
+        |limits| limits.fields = 1,
+        |limits| limits.fields = 0,
         |limits| *limits = Limits { seek_keys: limits.seek_keys, cell_sheets: 1, ..Limits::default() },
     ];
     for change in changes {
@@ -243,6 +252,99 @@ fn limits_that_are_too_low_leave_pixels_out_but_play() {
     assert!(survives(&with_limits(|limits| [&mut limits.key_layers, &mut limits.row_layers].into_iter().for_each(halve))));
     let refused = with_limits(|limits| limits.seek_keys = 1);
     assert!(matches!(Bundle::parse(&refused), Err(BundleError::Field { name: "PATH seek_keys", found: 1 })));
+}
+
+#[test]
+fn cells_show_no_more_sheets_than_the_bundle_says() {
+    let most = Bundle::parse(sound()).expect("sound").limits().cell_sheets;
+    for cell_sheets in 1..=most {
+        let bytes = with_limits(|limits| limits.cell_sheets = cell_sheets);
+        let (mut tests, mut torn) = (0, 0);
+        cubist_tests::play::visit(&bytes, 0..9, |frame, player| {
+            let _ = cubist_tests::play::pixels(player);
+            let work = player.work();
+            assert!(work.coverage_tests <= u32::from(cell_sheets - 1) * work.torn_pixels, "frame {frame}, {cell_sheets} sheets: {work:?}");
+            (tests, torn) = (tests + work.coverage_tests, torn + work.torn_pixels);
+        })
+        .expect("it plays");
+        assert_eq!(torn > 0, cell_sheets > 1, "{cell_sheets} sheets");
+        // The bound is met somewhere: it does not merely hold because cells have few sheets.
+        assert!(cell_sheets < 3 || tests > torn, "{cell_sheets} sheets: {tests} tests of {torn} pixels");
+    }
+}
+
+#[test]
+fn label_flags_play_in_every_combination_or_are_refused() {
+    for flags in 0..=255u8 {
+        let changed = |all: bool| {
+            let mut labels = section(LABELS).to_vec();
+            for record in labels.chunks_mut(LABEL_BYTES).take(if all { usize::MAX } else { 2 }) {
+                let label = LabelRecord { flags, ..LabelRecord::from_bytes((&*record).try_into().expect("a whole record")) };
+                record.copy_from_slice(&label.to_bytes());
+            }
+            with_section(sound(), LABELS, &labels)
+        };
+        let good = flags & !KNOWN_FLAGS == 0 && flags & (MASKED | FIXED) != MASKED | FIXED;
+        for bytes in [changed(true), changed(false)] {
+            assert_eq!(survives(&bytes), good, "flags {flags}");
+            let refused = Some(BundleError::Field { name: "LABL flags", found: u32::from(flags) });
+            assert!(good || Bundle::parse(&bytes).err() == refused, "flags {flags}");
+        }
+    }
+}
+
+#[test]
+fn more_fields_than_there_are_is_refused() {
+    let refused = with_limits(|limits| limits.fields = 3);
+    assert_eq!(Bundle::parse(&refused).err(), Some(BundleError::Field { name: "PATH fields", found: 3 }));
+}
+
+/// Bits as they come from a small generator, contexts ignored: lists that no encoder would write.
+struct Noise(Random);
+
+impl Bits for Noise {
+    fn bit(&mut self, _: &mut Probability, _: bool) -> bool {
+        self.0.below(3) > 0
+    }
+
+    fn flat(&mut self, count: u32, _: u32) -> u32 {
+        self.0.below(1 << count.min(16)) as u32
+    }
+}
+
+#[test]
+fn lists_of_noise_hold_known_tests_and_labels_only() {
+    let grid = Grid::new(200, 160, 3);
+    let mut seen = [0u32; 3];
+    for (seed, most) in (0..50).zip((1..=9u8).cycle()) {
+        let (mut rows, mut data) = (vec![0xffff; grid.rows + 1], vec![0xff; 6_000]);
+        let mut lists = Lists::new(&mut rows, &mut data).at_most(most);
+        let mut contexts = vec![Probability::NEW; lists::CONTEXTS];
+        // What is wanted is not what the bits say, and has tests that there are none of.
+        let wanted = Sheets { labels: [1, 2, 3].into_iter().collect(), tests: 0xffff };
+        lists::code(&mut Noise(Random(seed)), &mut contexts, grid, 7, None, &mut lists, &mut |_| wanted.clone());
+        for row in 0..grid.rows {
+            let mut cursor = lists.row(row);
+            for _ in 0..grid.columns {
+                let sheets = lists.sheets(cursor);
+                assert!(sheets.labels.len() <= usize::from(most) && sheets.labels.iter().all(|&label| label < 7), "{sheets:?}, {most}");
+                for index in 0..sheets.labels.len().saturating_sub(1) {
+                    let test = sheets.test(index);
+                    assert!([CHART, FIELD, BOTH].contains(&test), "{sheets:?}");
+                    seen[usize::from(test)] += 1;
+                }
+                cursor = cursor.next(&lists);
+            }
+        }
+    }
+    assert!(seen.iter().all(|&count| count > 0), "{seen:?}");
+}
+
+#[test]
+fn the_last_of_nine_sheets_has_no_test() {
+    let sheets = SheetsRef { labels: &[0; 9], tests: 0xffff };
+    assert!((0..8).all(|index| sheets.test(index) == 3));
+    assert_eq!(sheets.test(8), CHART, "sixteen bits hold eight tests");
 }
 
 #[test]
