@@ -165,10 +165,12 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let start = Instant::now();
     let Atlas { image, gbuffer, .. } = &flat.atlas;
     let grid = KeyGrid::new(gbuffer, settings.cell.trailing_zeros() as u8, settings.key_interval, scene.playback.looping, settings.time);
+    // In small cells and short intervals a few pixels are much.
+    let least = settings.least_pixels.min(settings.cell * settings.cell * settings.key_interval / 64).max(1);
     progress("finding sheets", 0.0);
-    let Folded { gbuffer, labels } = folds::unfold(gbuffer, &flat.tears, &grid, &image.labels, 2 * settings.least_pixels);
+    let Folded { gbuffer, labels } = folds::unfold(gbuffer, &flat.tears, &grid, &image.labels, 2 * least);
     let (gbuffer, image) = (&gbuffer, &SourceImage { labels, ..image.clone() });
-    let mut sheets = sheets::find(gbuffer, &grid, settings.least_pixels);
+    let mut sheets = sheets::find(gbuffer, &grid, least);
     let layers = Layers::of(&grid, &sheets);
     progress("fitting keys", 0.2);
     let fit = fit::solve(gbuffer, &grid, &sheets, &layers);

@@ -2,7 +2,7 @@
 //! interpolated like a position. They tell curved silhouettes, where the chart goes on beyond what is seen.
 //! Fitted to the G-buffer like positions are; `order` decides where they are used.
 //!
-//! Things thinner than a cell are *strips*: two fields, the distances from two opposite sides, both positive inside.
+//! Things thinner than a few cells are *strips*: two fields, the distances from two opposite sides, both positive inside.
 
 use crate::fit::{self, Problem};
 use crate::gbuffer::GBuffer;
@@ -13,8 +13,10 @@ use rayon::prelude::*;
 
 /// Distances are told apart up to this many cells.
 const REACH: f32 = 1.5;
+/// Things thinner than this many cells are strips: both their sides come by in one cell and interval when they move.
+const THIN: usize = 3;
 /// How fast a pixel's say falls with its distance from the outline, pixels: the outline has to be right, not the middle.
-const FALLOFF: f32 = 2.0;
+const FALLOFF: f32 = 0.6;
 
 /// The fields of all layers.
 #[derive(Clone, Debug)]
@@ -120,7 +122,7 @@ impl Look<'_> {
     }
 }
 
-/// Whether a label's runs of pixels are shorter than a cell, and along which axis.
+/// Whether a label's runs of pixels are short, and along which axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Thin {
     No,
@@ -128,11 +130,11 @@ enum Thin {
     Down,
 }
 
-/// Finds the labels that are thinner than a cell in most of the torn cells they are seen in.
+/// Finds the labels that are thin in most of the torn cells they are seen in.
 fn thin_labels(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, labels: usize) -> Vec<Thin> {
     let size = 1usize << grid.grid.log2;
     let cells = grid.grid.cells();
-    // Per label: torn cells it is seen in, those it crosses whole within a row, within a column.
+    // Per label: torn cells it is seen in, those where it is thin across, and down.
     let counts: Vec<[u32; 3]> = (0..sheets.lists.len())
         .into_par_iter()
         .filter(|&index| sheets.lists[index].len() > 1)
@@ -142,7 +144,7 @@ fn thin_labels(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, labels: usize
                 let (interval, cell) = (index / cells, index % cells);
                 let frames = grid.frames_of(interval);
                 let frame = frames.start + (frames.end - frames.start) / 2;
-                let look = |label| Look { gbuffer, grid, front: &[], label, reach: 2 * size };
+                let look = |label| Look { gbuffer, grid, front: &[], label, reach: THIN * size };
                 let mut longest: Vec<(u8, usize, [f32; 2])> = Vec::new();
                 grid.each_pixel(frame, cell, |pixel, _| {
                     let Ok(label) = u8::try_from(gbuffer.label[pixel]) else { return };
@@ -160,8 +162,8 @@ fn thin_labels(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, labels: usize
                 for (label, _, runs) in longest {
                     let count = &mut counts[usize::from(label)];
                     count[0] += 1;
-                    count[1] += u32::from(runs[0] < size as f32);
-                    count[2] += u32::from(runs[1] < size as f32);
+                    count[1] += u32::from(runs[0] < (THIN * size) as f32);
+                    count[2] += u32::from(runs[1] < (THIN * size) as f32);
                 }
                 counts
             },
