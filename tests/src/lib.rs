@@ -6,3 +6,8 @@ pub mod golden;
 pub mod play;
 pub mod reference;
 pub mod scenes;
+
+/// The README's code compiles.
+#[cfg(doctest)]
+#[doc = include_str!("../../README.md")]
+pub struct Readme;

@@ -35,7 +35,7 @@ pub fn bake(scene: &Scene, settings: &Settings) -> Result<(Flat, Encoded)> {
 /// The bytes of the bundle of the built-in scene `name` at `size` and `frames`.
 ///
 /// # Errors
-/// Those of [`reduced`] and [`bake`].
+/// Those of [`reduced`] and [`bake()`].
 pub fn bundle(name: &str, size: [u32; 2], frames: u32, settings: &Settings) -> Result<Vec<u8>> {
     Ok(bake(&reduced(name, size, frames)?, settings)?.1.bundle)
 }

@@ -121,8 +121,7 @@ impl Dump<'_> {
             self.varint(name, "");
         }
         self.byte("looping: ");
-        let log2 = self.byte("cell_log2 ");
-        assert_eq!(log2, 4);
+        self.byte("cell_log2 ");
         self.byte("time ");
         self.byte("step_log2 ");
         for name in ["key_layers ", "row_layers ", "list_bytes ", "row_sheets "] {
