@@ -4,8 +4,9 @@
 use crate::coder::{Bits, Probability};
 use crate::format::LabelRecord;
 use crate::grid::Grid;
-use crate::key::{self, Key, Setting, Source, Trace};
+use crate::key::{Key, Setting, Source};
 use crate::lists::{self, Lists};
+use crate::nodes::{self, Trace};
 
 /// Keys held at a time, at most: four to play a cubic interval. Two of them also tell the next.
 pub const MAX_KEYS: usize = 4;
@@ -17,9 +18,9 @@ pub const LISTS: usize = 3;
 pub struct Stream<'m> {
     /// [`lists::CONTEXTS`] of them.
     pub list_contexts: &'m mut [Probability],
-    /// [`key::CONTEXTS`] of them.
+    /// [`nodes::CONTEXTS`] of them.
     pub key_contexts: &'m mut [Probability],
-    /// Room for the layers of two rows of nodes.
+    /// Room for the layers of two rows of nodes: one trace each.
     pub traces: &'m mut [Trace],
     /// The last keys, in a ring of the first `slots`.
     pub keys: [Key<'m>; MAX_KEYS],
@@ -98,7 +99,7 @@ impl<'m> Stream<'m> {
             before_that: self.key(2).filter(|_| place.run >= 2).map(|key| (key, ratio(length, length_before))),
             lists: [place.has_before.then_some(&lists_before), place.has_after.then_some(&lists_after)],
         };
-        key::code(bits, key_contexts, &setting, &mut now, traces, source);
+        nodes::code(bits, key_contexts, &setting, &mut now, traces, source);
         (self.key_contexts, self.traces) = (key_contexts, traces);
         self.put(now_slot, now, [(list_slot, lists_after), (list_before_slot, lists_before)]);
     }

@@ -13,8 +13,9 @@ use cubist_core::fixed::{KEY_BITS, KEY_MAX, KEY_MIN, field_code};
 use cubist_core::format::{
     ATLAS, Atlas, Envelope, FIXED, INFO, KeyEntry, LABELS, LabelRecord, Limits, MAGIC, MASK, MASKED, PATH, Path, STRIP, Section, VERSION,
 };
-use cubist_core::key::{self, Key, Source, Trace};
+use cubist_core::key::{Key, Source};
 use cubist_core::lists::{self, Lists};
+use cubist_core::nodes::{self, Trace};
 use cubist_core::record::{LISTS, MAX_KEYS, Place, Shape, Stream};
 use range::Encoder;
 
@@ -212,7 +213,7 @@ impl Memory {
     fn new(grid: &KeyGrid, limits: Limits) -> Self {
         let layers = usize::from(limits.key_layers);
         Self {
-            contexts: [vec![Probability::NEW; lists::CONTEXTS], vec![Probability::NEW; key::CONTEXTS]],
+            contexts: [vec![Probability::NEW; lists::CONTEXTS], vec![Probability::NEW; nodes::CONTEXTS]],
             traces: vec![Trace::default(); 2 * usize::from(limits.row_layers)],
             keys: std::array::from_fn(|_| {
                 (vec![0; grid.grid.nodes() + 1], vec![0; layers], vec![0; layers], [vec![0; layers], vec![0; layers]])
