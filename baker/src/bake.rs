@@ -61,17 +61,8 @@ pub enum BakeError {
     #[error(transparent)]
     Verify(#[from] VerifyError),
     /// The scene is more than a bundle can hold.
-    #[error("{what}: {found}, but a bundle holds at most {most}; {cure}")]
-    Limit {
-        /// What there is too much of.
-        what: &'static str,
-        /// How much there is.
-        found: usize,
-        /// How much there can be.
-        most: usize,
-        /// What to do about it.
-        cure: &'static str,
-    },
+    #[error(transparent)]
+    Limit(#[from] encode::Exceeded),
 }
 
 /// What may be chosen about a bundle.
@@ -183,9 +174,9 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     evidence.fields = Some(&fields);
     order::sort(&evidence, &mut sheets);
     progress("coding keys", 0.8);
-    let header = encode::Frame { fps: scene.playback.fps, info: &scene.name };
+    let header = encode::Header { fps: scene.playback.fps, info: &scene.name };
     let content = Content { gbuffer, grid: &grid, image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields };
-    let bundle = encode::bundle(&content, settings.coding, header);
+    let bundle = encode::bundle(&content, settings.coding, header)?;
     progress("coding keys", 1.0);
     Ok(Encoded { bundle, grid, dropped_pixels: sheets.dropped, seconds: start.elapsed().as_secs_f64() })
 }

@@ -22,13 +22,13 @@ const FALLOFF: f32 = 0.6;
 #[derive(Clone, Debug)]
 pub struct Fields {
     /// Two distances a layer, pixels, as the player will have them.
-    pub uv: Vec<[f32; 2]>,
+    pub distance: Vec<[f32; 2]>,
     /// Labels that are strips.
     pub strip: Vec<bool>,
 }
 
 /// The distances from a pixel to the nearest change between a sheet and what lies behind it: left, right, up, down, pixels;
-/// `None` within reach.
+/// `None` where there is none within reach.
 type Distances = [Option<f32>; 4];
 
 /// Fits the fields of all layers, given the sheets front to back.
@@ -57,7 +57,8 @@ pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers
     };
     let fitted = fit::solve_for(&Problem { grid, sheets, layers, time: TIME_LINEAR, target });
     let stored = |distance: f32| field_distance(field_code(libm::roundf(distance * 256.0) as i32)) as f32 / 256.0;
-    Fields { uv: fitted.uv.iter().map(|pair| pair.map(stored)).collect(), strip: thin.iter().map(|&thin| thin != Thin::No).collect() }
+    let strip = thin.iter().map(|&thin| thin != Thin::No).collect();
+    Fields { distance: fitted.uv.iter().map(|pair| pair.map(stored)).collect(), strip }
 }
 
 /// The target and weight of one field: the distance from the outline, from those along the two axes.
@@ -145,21 +146,18 @@ fn thin_labels(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, labels: usize
                 let frames = grid.frames_of(interval);
                 let frame = frames.start + (frames.end - frames.start) / 2;
                 let look = |label| Look { gbuffer, grid, front: &[], label, reach: THIN * size };
-                let mut longest: Vec<(u8, usize, [f32; 2])> = Vec::new();
+                let mut longest: Vec<(u8, [f32; 2])> = Vec::new();
                 grid.each_pixel(frame, cell, |pixel, _| {
                     let Ok(label) = u8::try_from(gbuffer.label[pixel]) else { return };
                     let [left, right, up, down] = look(label).around(pixel, true);
                     let run = |a: Option<f32>, b: Option<f32>| a.zip(b).map_or(f32::INFINITY, |(a, b)| a + b);
                     let runs = [run(left, right), run(up, down)];
                     match longest.iter_mut().find(|(l, ..)| *l == label) {
-                        Some((_, n, sum)) => {
-                            *n += 1;
-                            *sum = [sum[0].max(runs[0]), sum[1].max(runs[1])];
-                        }
-                        None => longest.push((label, 1, runs)),
+                        Some((_, most)) => *most = [most[0].max(runs[0]), most[1].max(runs[1])],
+                        None => longest.push((label, runs)),
                     }
                 });
-                for (label, _, runs) in longest {
+                for (label, runs) in longest {
                     let count = &mut counts[usize::from(label)];
                     count[0] += 1;
                     count[1] += u32::from(runs[0] < (THIN * size) as f32);

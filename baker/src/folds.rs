@@ -10,6 +10,8 @@ use rayon::prelude::*;
 
 /// The label of a pixel that belongs to no sheet: a part too small to keep.
 pub const NONE: u16 = u16::MAX;
+/// The part of a pixel whose part was too small to keep. A cell and interval has up to 32 x 32 x 320 pixels: parts need 32 bits.
+const GIVEN_UP: u32 = u32::MAX;
 /// Parts of one chart that are told apart where they meet.
 const PARTS: usize = 4;
 /// The most labels there are.
@@ -55,8 +57,8 @@ pub fn unfold(gbuffer: &GBuffer, tears: &[u8], grid: &KeyGrid, labels: &[Label],
 /// The torn cells' pixels, by the part they belong to.
 struct Parts {
     /// Cells (interval times cells plus cell) with tears, ascending, and for each pixel of theirs, frame by frame and row by row,
-    /// its part: a number within the cell, [`NONE`] where it was given up.
-    torn: Vec<(usize, Vec<u16>)>,
+    /// its part: a number within the cell, [`GIVEN_UP`] where it was too small.
+    torn: Vec<(usize, Vec<u32>)>,
 }
 
 impl Parts {
@@ -142,47 +144,48 @@ impl Block {
         steps
     }
 
-    /// Connected parts of each label; small ones are given up.
-    fn parts(&self, gbuffer: &GBuffer, tears: &[u8], grid: &KeyGrid, least: u32) -> Vec<u16> {
+    /// Connected parts of each label; those of fewer than `least` pixels are given up, but never all of them: a cell has to show something.
+    fn parts(&self, gbuffer: &GBuffer, tears: &[u8], grid: &KeyGrid, least: u32) -> Vec<u32> {
         let pixels: Vec<usize> = self.pixels(grid).collect();
-        let mut parent: Vec<u16> = (0..pixels.len() as u16).collect();
-        fn root(parent: &mut [u16], mut at: u16) -> u16 {
-            while parent[usize::from(at)] != at {
-                parent[usize::from(at)] = parent[usize::from(parent[usize::from(at)])];
-                at = parent[usize::from(at)];
+        let mut parent: Vec<u32> = (0..pixels.len() as u32).collect();
+        fn root(parent: &mut [u32], mut at: u32) -> u32 {
+            while parent[at as usize] != at {
+                parent[at as usize] = parent[parent[at as usize] as usize];
+                at = parent[at as usize];
             }
             at
         }
         for (place, &pixel) in pixels.iter().enumerate() {
             for (bit, near, far) in self.steps(place) {
                 if tears[pixel] & bit == 0 && gbuffer.label[pixel] == gbuffer.label[pixel + far] {
-                    let (a, b) = (root(&mut parent, place as u16), root(&mut parent, (place + near) as u16));
-                    parent[usize::from(a.max(b))] = a.min(b);
+                    let (a, b) = (root(&mut parent, place as u32), root(&mut parent, (place + near) as u32));
+                    parent[a.max(b) as usize] = a.min(b);
                 }
             }
         }
-        let roots: Vec<u16> = (0..pixels.len() as u16).map(|place| root(&mut parent, place)).collect();
+        let roots: Vec<u32> = (0..pixels.len() as u32).map(|place| root(&mut parent, place)).collect();
         let mut count = vec![0u32; pixels.len()];
         for &root in &roots {
-            count[usize::from(root)] += 1;
+            count[root as usize] += 1;
         }
-        roots.iter().map(|&root| if count[usize::from(root)] >= least { root } else { NONE }).collect()
+        let least = least.min(count.iter().copied().max().unwrap_or(0));
+        roots.iter().map(|&root| if count[root as usize] >= least { root } else { GIVEN_UP }).collect()
     }
 
     /// Gives every part the number that most of its neighbours already have, to the left, above and before; parts of one label
     /// in the cell get different ones.
-    fn adopt(&self, gbuffer: &GBuffer, tears: &[u8], grid: &KeyGrid, folding: &[bool], own: Option<&[u16]>, part: &mut [u8]) {
+    fn adopt(&self, gbuffer: &GBuffer, tears: &[u8], grid: &KeyGrid, folding: &[bool], own: Option<&[u32]>, part: &mut [u8]) {
         let pixels: Vec<usize> = self.pixels(grid).collect();
         if !pixels.iter().any(|&pixel| folding[usize::from(gbuffer.label[pixel])]) {
             return;
         }
         let [width, height, _] = self.size;
         // Label and part here, pixels, votes.
-        let mut found: Vec<(u16, u16, u32, [u32; PARTS])> = Vec::new();
+        let mut found: Vec<(u16, u32, u32, [u32; PARTS])> = Vec::new();
         let key = |place: usize| (gbuffer.label[pixels[place]], own.map_or(0, |own| own[place]));
         for (place, &pixel) in pixels.iter().enumerate() {
             let (label, here) = key(place);
-            if here == NONE {
+            if here == GIVEN_UP {
                 continue;
             }
             let at = found.iter().position(|&(l, p, ..)| (l, p) == (label, here)).unwrap_or_else(|| {
@@ -209,7 +212,7 @@ impl Block {
         found.sort_by_key(|&(label, here, pixels, votes)| {
             (std::cmp::Reverse(votes.iter().copied().max()), std::cmp::Reverse(pixels), label, here)
         });
-        let mut chosen: Vec<((u16, u16), u8)> = Vec::new();
+        let mut chosen: Vec<((u16, u32), u8)> = Vec::new();
         for &(label, here, _, votes) in &found {
             let taken = |number: usize| chosen.iter().any(|&((l, _), n)| l == label && usize::from(n) == number);
             let free = (0..PARTS).filter(|&number| !taken(number));
@@ -221,5 +224,50 @@ impl Block {
             let number = chosen.iter().find(|&&(who, _)| who == (label, here)).map_or(u8::MAX, |&(_, number)| number);
             part[pixel] = if folding[usize::from(label)] { number } else { 0 };
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sheets;
+    use cubist_core::format::TIME_LINEAR;
+
+    /// One label everywhere, torn where `tear` says, in cells of 2^`cell_log2` pixels and one interval; folded and looked through.
+    fn folded(size: [u32; 2], frames: u32, cell_log2: u8, tear: impl Fn(usize) -> u8) -> (Folded, sheets::Sheets) {
+        let pixels = (size[0] * size[1] * frames) as usize;
+        let uv = vec![[8.0f32; 2]; pixels];
+        let gbuffer = GBuffer { width: size[0], height: size[1], frames, label: vec![1; pixels], uv: uv.into() };
+        let labels = vec![Label { rect: [0, 0, 16, 16], masked: false, fixed: None }; 2];
+        let grid = KeyGrid::new(&gbuffer, cell_log2, frames, true, TIME_LINEAR);
+        let tears: Vec<u8> = (0..pixels).map(tear).collect();
+        let folded = unfold(&gbuffer, &tears, &grid, &labels, 16);
+        let sheets = sheets::find(&folded.gbuffer, &grid, 8);
+        (folded, sheets)
+    }
+
+    #[test]
+    fn the_largest_cell_and_longest_interval_keep_their_parts_apart() {
+        // 32 x 32 x 256 pixels, torn down the middle.
+        let (folded, sheets) = folded([32, 32], 256, 5, |pixel| if pixel % 32 == 15 { RIGHT } else { 0 });
+        assert_eq!(folded.labels.len(), 3);
+        assert!(folded.gbuffer.label.iter().enumerate().all(|(pixel, &label)| (label == folded.gbuffer.label[0]) == (pixel % 32 < 16)));
+        assert_eq!((sheets.lists[0].len(), sheets.dropped), (2, 0));
+    }
+
+    #[test]
+    fn a_cell_torn_to_shreds_still_shows_something() {
+        // Screens end anywhere: the second cell is a column of four pixels, each torn from the next.
+        let (folded, sheets) = folded([5, 4], 1, 2, |pixel| if pixel % 5 == 4 { DOWN } else { 0 });
+        assert!(sheets.lists.iter().all(|list| !list.is_empty()), "{:?} {:?}", sheets.lists, folded.gbuffer.label);
+    }
+
+    #[test]
+    fn shreds_that_are_given_up_count_as_dropped() {
+        let (folded, sheets) = folded([8, 8], 1, 3, |pixel| match pixel {
+            0 => RIGHT | DOWN,
+            _ => 0,
+        });
+        assert_eq!((folded.gbuffer.label[0], sheets.dropped), (NONE, 1));
     }
 }

@@ -99,7 +99,7 @@ fn observe(evidence: &Evidence<'_>, index: usize, list: &[u8]) -> Vec<Group> {
             chains.iter().map(|chains| chains.map(|chain| chain.value(values, weights))).collect()
         };
         let positions = at_corners(&position_chains, &fit.uv, &weights);
-        let distances = fields.map(|fields| at_corners(&field_chains, &fields.uv, &linear));
+        let distances = fields.map(|fields| at_corners(&field_chains, &fields.distance, &linear));
         grid.each_pixel(frame, cell, |pixel, at| {
             let Some(sheet) = list.iter().position(|&label| u16::from(label) == gbuffer.label[pixel]) else { return };
             let corner = bilinear(at);

@@ -135,11 +135,11 @@ pub fn bilinear([x, y]: [f32; 2]) -> [f32; 4] {
 /// The sheets of every cell and interval, interval-major; labels, most seen last.
 #[derive(Clone, Debug)]
 pub struct Sheets {
-    /// Labels of the cell `interval * cells + cell`.
+    /// Labels of the cell `interval * cells + cell`, at least one each.
     pub lists: Vec<Vec<u8>>,
     /// The coverage tests of all but the last, two bits each, the first one's lowest.
     pub tests: Vec<u16>,
-    /// Pixels whose sheet was left out.
+    /// Pixels whose sheet was left out, and those that `folds` had given up.
     pub dropped: u64,
 }
 
@@ -151,9 +151,14 @@ pub fn find(gbuffer: &GBuffer, grid: &KeyGrid, least: u32) -> Sheets {
         .into_par_iter()
         .map(|index| {
             let mut counts: Vec<(u8, u32)> = Vec::new();
+            // Pixels that `folds` gave up have no label.
+            let mut without = 0u64;
             for frame in grid.frames_of(index / cells) {
                 grid.each_pixel(frame, index % cells, |pixel, _| {
-                    let Ok(label) = u8::try_from(gbuffer.label[pixel]) else { return };
+                    let Ok(label) = u8::try_from(gbuffer.label[pixel]) else {
+                        without += 1;
+                        return;
+                    };
                     match counts.iter_mut().find(|(l, _)| *l == label) {
                         Some((_, count)) => *count += 1,
                         None => counts.push((label, 1)),
@@ -163,8 +168,8 @@ pub fn find(gbuffer: &GBuffer, grid: &KeyGrid, least: u32) -> Sheets {
             // Most seen first, ties by label: what is cut off is the least.
             counts.sort_by_key(|&(label, count)| (std::cmp::Reverse(count), label));
             let kept = counts.iter().take(MAX_SHEETS).take_while(|&&(_, count)| count >= least).count().max(1);
-            let dropped = counts[kept..].iter().map(|&(_, count)| u64::from(count)).sum();
-            (counts[..kept].iter().rev().map(|&(label, _)| label).collect(), dropped)
+            let dropped: u64 = counts[kept..].iter().map(|&(_, count)| u64::from(count)).sum();
+            (counts[..kept].iter().rev().map(|&(label, _)| label).collect(), dropped + without)
         })
         .collect();
     let dropped = found.iter().map(|(_, dropped)| dropped).sum();

@@ -172,24 +172,24 @@ impl Search<'_> {
     /// Measures every way to code keys at one source image.
     fn keys(&self, flat: &Flat, samples: &Samples, steps: usize) -> Result<Vec<Keys>, BakeError> {
         let (image_bytes, image_error) = (image_bytes(&flat.atlas), samples.of_image(&flat.atlas));
-        let mut keys = Vec::new();
+        let (mut keys, mut exceeded) = (Vec::new(), None);
         for grid in self.grids(self.options.source, &CELLS) {
             for lambda in BUDGET_LAMBDAS {
                 self.say(DENSITIES.len() + keys.len(), steps);
                 let mut settings = grid;
                 settings.coding.lambda = lambda;
-                let bundle = self.encode(flat, &settings)?.bundle;
+                let Some(Encoded { bundle, .. }) = possible(self.encode(flat, &settings), &mut exceeded)? else { continue };
                 let (error, _) = samples.of_bundle(&bundle)?;
                 keys.push(Keys { settings, bytes: bundle.len().saturating_sub(image_bytes), error: (error - image_error).max(0.0) });
             }
         }
-        Ok(keys)
+        exceeded.filter(|_| keys.is_empty()).map_or(Ok(keys), Err)
     }
 
     /// Bakes the pairs that promise most until enough of them fit, and keeps the best.
     fn best_pair(&self, budget: u64, pairs: &[(&Image, &Keys)], samples: &Samples, steps: usize) -> Result<Chosen, BakeError> {
         let mut current: Option<(f64, Flat)> = None;
-        let mut best: Option<(f64, Settings)> = None;
+        let (mut best, mut exceeded): (Option<(f64, Settings)>, _) = (None, None);
         let (mut fitting, mut smallest) = (0, u64::MAX);
         // Where nothing is predicted to fit, the smallest prediction is tried all the same.
         let least = pairs.iter().map(|(image, keys)| image.bytes + keys.bytes).min().unwrap_or(0);
@@ -204,7 +204,9 @@ impl Search<'_> {
                 _ => self.flat(image.source)?,
             };
             let settings = Settings { atlas: image.source, ..keys.settings };
-            let bundle = self.encode(&flat, &settings)?.bundle;
+            let encoded = possible(self.encode(&flat, &settings), &mut exceeded)?;
+            current = Some((image.source.density, flat));
+            let Some(Encoded { bundle, .. }) = encoded else { continue };
             smallest = smallest.min(bundle.len() as u64);
             if bundle.len() as u64 <= budget {
                 fitting += 1;
@@ -213,9 +215,10 @@ impl Search<'_> {
                     best = Some((psnr, settings));
                 }
             }
-            current = Some((image.source.density, flat));
         }
-        let Some((_, settings)) = best else { return Err(BakeError::Budget { budget, smallest }) };
+        let Some((_, settings)) = best else {
+            return Err(exceeded.filter(|_| smallest == u64::MAX).unwrap_or(BakeError::Budget { budget, smallest }));
+        };
         let flat = match current {
             Some((density, flat)) if density == settings.atlas.density => flat,
             _ => self.flat(settings.atlas)?,
@@ -264,36 +267,53 @@ impl Search<'_> {
         steps: usize,
         nearest: &mut f64,
     ) -> Result<Option<Settings>, BakeError> {
-        let mut measure = |settings: &Settings| -> Result<(usize, f64), BakeError> {
-            let bundle = self.encode(flat, settings)?.bundle;
+        let mut exceeded = None;
+        let mut measure = |settings: &Settings| -> Result<Option<(usize, f64)>, BakeError> {
+            let Some(Encoded { bundle, .. }) = possible(self.encode(flat, settings), &mut exceeded)? else { return Ok(None) };
             let psnr = verify::against_exact(&bundle, &flat.atlas, &|_, _| {})?.psnr_mean;
             *nearest = nearest.max(psnr);
-            Ok((bundle.len(), psnr))
+            Ok(Some((bundle.len(), psnr)))
         };
         let mut measured: Vec<(usize, f64, Settings)> = Vec::new();
         for (step, settings) in self.grids(source, cells).into_iter().enumerate() {
             self.say(step, steps);
-            let (bytes, psnr) = measure(&settings)?;
-            measured.push((bytes, psnr, settings));
+            if let Some((bytes, psnr)) = measure(&settings)? {
+                measured.push((bytes, psnr, settings));
+            }
         }
         let reaching = measured.iter().filter(|(_, psnr, _)| *psnr >= asked).min_by_key(|(bytes, ..)| *bytes);
         let Some(&(bytes, _, grid)) = reaching else {
             // Just missed: the grid that comes closest, without any saving on ghosts and with all bits of the coordinates.
-            let Some(&(.., mut grid)) = measured.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else { return Ok(None) };
+            let Some(&(.., mut grid)) = measured.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else {
+                // Not a single bundle: what was in the way is the answer, unless coarser cells have had theirs.
+                return exceeded.filter(|_| *nearest == 0.0).map_or(Ok(None), Err);
+            };
             (grid.coding.lambda, grid.coding.step_log2) = (FINEST_LAMBDA, 0);
-            return Ok((measure(&grid)?.1 >= asked).then_some(grid));
+            return Ok(measure(&grid)?.filter(|&(_, psnr)| psnr >= asked).map(|_| grid));
         };
         let mut best = (bytes, grid);
         for (step, lambda) in QUALITY_LAMBDAS.into_iter().enumerate() {
             self.say(CELLS.len() * INTERVALS.len() + step, steps);
             let mut settings = grid;
             settings.coding.lambda = lambda;
-            let (bytes, psnr) = measure(&settings)?;
+            let Some((bytes, psnr)) = measure(&settings)? else { continue };
             if psnr >= asked && bytes < best.0 {
                 best = (bytes, settings);
             }
         }
         Ok(Some(best.1))
+    }
+}
+
+/// What came of an attempt; `None` where a bundle cannot hold it: that ends the attempt, not the search. The first to exceed
+/// a bound is remembered.
+fn possible<T>(attempt: Result<T, BakeError>, exceeded: &mut Option<BakeError>) -> Result<Option<T>, BakeError> {
+    match attempt {
+        Err(error @ BakeError::Limit(_)) => {
+            exceeded.get_or_insert(error);
+            Ok(None)
+        }
+        other => other.map(Some),
     }
 }
 

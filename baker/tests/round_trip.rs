@@ -1,11 +1,11 @@
 //! From a G-buffer to bytes to pixels: two sheets, one moving in front of the other.
 
 use cubist_baker::atlas::{Label, SourceImage};
-use cubist_baker::encode::{self, CodingSettings, Content, Frame as Header};
+use cubist_baker::encode::{self, CodingSettings, Content, Exceeded, Header};
 use cubist_baker::gbuffer::GBuffer;
 use cubist_baker::sheets::{self, KeyGrid, Layers};
 use cubist_baker::{fields, fit, order};
-use cubist_core::format::{TIME_CUBIC, TIME_LINEAR};
+use cubist_core::format::{TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
 use cubist_core::{Bundle, Frame, Player};
 
 const SIZE: [u32; 2] = [100, 60];
@@ -41,7 +41,12 @@ fn gbuffer(looping: bool) -> (GBuffer, SourceImage) {
 }
 
 fn bake(gbuffer: &GBuffer, image: &SourceImage, looping: bool, independent_every: usize, time: u8) -> Vec<u8> {
-    let grid = KeyGrid::new(gbuffer, 3, 8, looping, time);
+    bake_every(8, gbuffer, image, looping, independent_every, time)
+}
+
+/// Keys every `interval` frames.
+fn bake_every(interval: u32, gbuffer: &GBuffer, image: &SourceImage, looping: bool, independent_every: usize, time: u8) -> Vec<u8> {
+    let grid = KeyGrid::new(gbuffer, 3, interval, looping, time);
     let mut sheets = sheets::find(gbuffer, &grid, 1);
     let layers = Layers::of(&grid, &sheets);
     let fit = fit::solve(gbuffer, &grid, &sheets, &layers);
@@ -52,7 +57,7 @@ fn bake(gbuffer: &GBuffer, image: &SourceImage, looping: bool, independent_every
     order::sort(&evidence, &mut sheets);
     let settings = CodingSettings { step_log2: 0, lambda: 0.0, independent_every };
     let content = Content { gbuffer, grid: &grid, image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields };
-    encode::bundle(&content, settings, Header { fps: 30, info: "two sheets" })
+    encode::bundle(&content, settings, Header { fps: 30, info: "two sheets" }).expect("it fits")
 }
 
 fn play(bytes: &[u8], frames: impl Iterator<Item = u32>) -> Vec<Vec<u16>> {
@@ -104,10 +109,45 @@ fn any_frame_is_the_same_whatever_was_shown_before() {
 }
 
 #[test]
+fn loops_and_paths_of_few_keys_play_in_any_order() {
+    // A loop has one to three keys, a path two to four.
+    for (interval, looping) in [(12, false), (17, false), (40, false), (12, true), (17, true), (40, true)] {
+        for time in [TIME_HOLD, TIME_LINEAR, TIME_CUBIC] {
+            let (gbuffer, image) = gbuffer(looping);
+            let bytes = bake_every(interval, &gbuffer, &image, looping, 2, time);
+            let fresh: Vec<Vec<u16>> = (0..FRAMES).flat_map(|frame| play(&bytes, frame..frame + 1)).collect();
+            let order: Vec<u32> = (0..FRAMES).chain((0..FRAMES).rev()).chain((0..66).map(|i| i * 14 % FRAMES)).collect();
+            for (picture, &frame) in play(&bytes, order.iter().copied()).iter().zip(&order) {
+                assert!(picture == &fresh[frame as usize], "frame {frame}, keys every {interval}, looping {looping}, time {time}");
+            }
+        }
+    }
+}
+
+#[test]
 fn the_number_of_independent_keys_does_not_change_the_picture() {
     let (gbuffer, image) = gbuffer(true);
     let one = bake(&gbuffer, &image, true, 100, TIME_CUBIC);
     let all = bake(&gbuffer, &image, true, 1, TIME_CUBIC);
     assert!(one.len() < all.len());
     assert!(play(&one, 0..FRAMES) == play(&all, 0..FRAMES));
+}
+
+#[test]
+fn more_layers_than_a_key_can_have_are_an_error_with_a_cure() {
+    // 257 x 257 nodes with a layer each.
+    let pixels = 1024 * 1024;
+    let gbuffer = GBuffer { width: 1024, height: 1024, frames: 1, label: vec![1; pixels], uv: vec![[0.5f32; 2]; pixels].into() };
+    let (_, image) = self::gbuffer(false);
+    let grid = KeyGrid::new(&gbuffer, 2, 1, false, TIME_LINEAR);
+    let sheets = sheets::find(&gbuffer, &grid, 1);
+    let layers = Layers::of(&grid, &sheets);
+    let count = layers.label.len();
+    let fit = fit::Fit { uv: vec![[0.5; 2]; count], weight: vec![1.0; count] };
+    let fields = fields::Fields { distance: vec![[0.0; 2]; count], strip: vec![false; image.labels.len()] };
+    let settings = CodingSettings { step_log2: 0, lambda: 0.0, independent_every: 1 };
+    let content = Content { gbuffer: &gbuffer, grid: &grid, image: &image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields };
+    let error = encode::bundle(&content, settings, Header { fps: 30, info: "" }).expect_err("more than 16 bits can say");
+    assert!(matches!(error, Exceeded { what: "layers in a key", found: 66_049, most: 65_535, .. }), "{error:?}");
+    assert!(error.to_string().contains("--cell"), "{error}");
 }

@@ -8,7 +8,7 @@ use crate::lists::Lists;
 use crate::span::{Fields, Span};
 use crate::timeline::{Moment, WeightSet};
 
-/// A layer at one moment.
+/// A layer at one moment: a [`PlayUv`] in caller's memory.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Layer {
@@ -44,9 +44,7 @@ impl Around<'_, '_> {
         let four = [before.unwrap_or_default(), self.from.uv(from), self.to.uv(to), after.unwrap_or_default()];
         PlayUv { u: blend(four.map(KeyUv::u), *weights), v: blend(four.map(KeyUv::v), *weights) }
     }
-}
 
-impl Around<'_, '_> {
     /// The fields of a layer, straight between the interval's keys, Q16 pixels.
     fn field(&self, [from, to]: [usize; 2], linear: i32) -> [i32; 2] {
         let ([a, b], [c, d]) = (self.from.field(from), self.to.field(to));
@@ -66,7 +64,7 @@ pub struct NodeRow<'m> {
     pub start: &'m mut [u16],
     /// Labels, ascending at each node.
     pub label: &'m mut [u8],
-    /// Positions.
+    /// Positions, Q15.16 texels.
     pub layer: &'m mut [Layer],
     /// Fields, Q16 pixels; empty where the bundle has none.
     pub field: &'m mut [[i32; 2]],
@@ -121,7 +119,7 @@ impl NodeRow<'_> {
     }
 }
 
-/// One sheet of a cell: its label and its layers at the cell's four corners.
+/// One sheet of a cell: its label, its test, and where its layers at the cell's four corners stand in the two [`NodeRow`]s.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Sheet {
@@ -144,7 +142,7 @@ impl Sheet {
         self.test as u16
     }
 
-    /// The sheet's fields along pixel row `step` of the cell.
+    /// The sheet's fields along pixel row `step` (0 at the top) of the cell, which is 2^`log2` pixels high.
     #[must_use]
     pub fn fields(&self, top: &NodeRow<'_>, bottom: &NodeRow<'_>, step: u32, log2: u32) -> Fields {
         let edge = |above: u16, below: u16| {
@@ -155,7 +153,7 @@ impl Sheet {
         Fields::between(edge(a, c), edge(b, d), log2)
     }
 
-    /// The sheet along pixel row `step` of the cell.
+    /// The sheet along pixel row `step` (0 at the top) of the cell, which is 2^`log2` pixels high.
     #[must_use]
     pub fn span(&self, top: &NodeRow<'_>, bottom: &NodeRow<'_>, step: u32, log2: u32) -> Span {
         let edge = |above: u16, below: u16| {

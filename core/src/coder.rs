@@ -1,8 +1,8 @@
 //! Entropy coding: a binary range coder with adaptive contexts, and how numbers become bits.
-//! Bytes come from a bundle's key records; `lists` and `key` describe what is coded, through
+//! Bytes come from a bundle's key records; `lists` and `nodes` describe what is coded, through
 //! [`Bits`], which the baker's encoder implements too: one description of the stream for both.
 //!
-//! The coder is the carry-less decoder of LZMA (Igor Pavlov): 32-bit range, 12-bit probabilities.
+//! The range decoder is LZMA's (Igor Pavlov): 32-bit range, 12-bit probabilities; how fast they adapt is our own.
 
 /// Bits go in (encoder) or come out (decoder); what is coded, and in which context, is said once.
 pub trait Bits {

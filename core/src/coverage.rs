@@ -1,6 +1,6 @@
-//! Coverage: does a sheet of a torn cell show at a pixel?
-//! The chart test: the sheet's own position in the source image falls inside its label's chart.
-//! It costs no data and is near exact for every polygonal outline, however thin.
+//! Coverage: the chart test. A sheet of a torn cell shows at a pixel where its own position in the source image falls
+//! inside its label's chart. It costs no data and is near exact for every polygonal outline, however thin.
+//! Labels come from the bundle, positions from `span`, which also makes the other test, that of the fields.
 
 use crate::atlas::Texture;
 use crate::fixed::{PLAY_BITS, PlayUv};

@@ -1,11 +1,14 @@
 //! Fixed-point numbers: how coordinates are stored in keys, how they are interpolated.
 //! Values come from `key`, weights from `timeline`; results go to `cell` and `span`.
+//!
+//! A number's unit goes with its place: stored positions count 1/32 texel, playback's are Q15.16 texels; time weights are Q14;
+//! a field is a code from -37 to 37 where it is stored, Q8 pixels in a key, Q16 pixels during playback.
 
 /// Fraction bits of a stored coordinate: 1/32 texel.
 pub const KEY_BITS: u32 = 5;
-/// The least stored coordinate, 1/32 texel: half a picture's width outside, because ghosts are extrapolated.
+/// The least stored coordinate, 1/32 texel: 512 texels outside the picture, because ghosts are extrapolated.
 pub const KEY_MIN: i32 = -512 << KEY_BITS;
-/// The largest stored coordinate, 1/32 texel.
+/// The largest stored coordinate, 1/32 texel: just below 1536 texels.
 pub const KEY_MAX: i32 = KEY_MIN + 0xffff;
 /// Fraction bits of a time weight.
 pub const WEIGHT_BITS: u32 = 14;
@@ -53,7 +56,7 @@ pub struct PlayUv {
 #[must_use]
 #[expect(
     clippy::arithmetic_side_effects,
-    reason = "weights sum to one with magnitudes of at most 1.6: the sum stays below 1.6 * 2^30 in size"
+    reason = "the weights' magnitudes sum to at most 1.6 and values are below 1.5 * 2^15: no partial sum reaches 1.2 * 2^30 in size"
 )]
 pub const fn blend([a, b, c, d]: [i32; 4], [e, f, g, h]: [i32; 4]) -> i32 {
     const DROP: u32 = KEY_BITS + WEIGHT_BITS - PLAY_BITS;
@@ -70,7 +73,7 @@ pub const fn part(from: i32, to: i32, step: u32, log2: u32) -> i32 {
     (from as i64 + (((to as i64 - from as i64) * step as i64) >> log2)) as i32
 }
 
-/// The largest field code: 128 pixels.
+/// The largest size of a field code, which stands for 128 pixels.
 pub const MAX_FIELD: i32 = 37;
 
 /// The distance that field code `code` stands for, Q8 pixels: four steps an octave from 1/4 pixel, with a sign; 0 is 0.

@@ -12,7 +12,7 @@ pub const VERSION: u16 = 1;
 pub const MAX_SECTIONS: usize = 16;
 /// The most sheets a cell can hold: the tests of all but the last fit into 16 bits.
 pub const MAX_SHEETS: usize = 9;
-/// The most layers a node can hold: every label of the cells around it.
+/// The most layers a node can hold: labels of the four cells around it in two intervals. Those past it are left out.
 pub const MAX_NODE_LAYERS: usize = 48;
 
 /// Tag of the section that holds the camera path: screen, timeline, keys. A [`Path`].
@@ -87,13 +87,13 @@ pub struct LabelRecord {
     pub right: u16,
     /// Bottom edge, exclusive.
     pub bottom: u16,
-    /// [`MASKED`], [`FIXED`].
+    /// [`MASKED`], [`FIXED`], [`STRIP`].
     pub flags: u8,
     /// Room for a tint; 0: none.
     pub tint: [u8; 3],
-    /// [`FIXED`] labels: u at the screen's left edge, 1/32 texel.
+    /// [`FIXED`] labels: u at the leftmost nodes, which stand at pixel centres, 1/32 texel.
     pub origin_u: u16,
-    /// [`FIXED`] labels: v at the screen's top edge, 1/32 texel.
+    /// [`FIXED`] labels: v at the topmost nodes, 1/32 texel.
     pub origin_v: u16,
     /// [`FIXED`] labels: u a pixel to the right, 1/16384 texel.
     pub step_u: u16,
@@ -176,14 +176,15 @@ pub struct Path<'a> {
     pub records: &'a [u8],
 }
 
-/// Upper bounds, stated by the baker, enforced by the player.
+/// Upper bounds, stated by the baker. The player's memory and work follow from them: what a bundle holds beyond them is not
+/// played. [`Limits::seek_keys`] is checked against the key table when the bundle is parsed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Limits {
-    /// Layers in a key.
+    /// Layers in a key, all nodes together.
     pub key_layers: u16,
     /// Layers in a row of nodes of a key.
     pub row_layers: u16,
-    /// Bytes of a key interval's sheet lists.
+    /// Bytes of a key interval's sheet lists, as [`crate::lists::bytes`] counts them.
     pub list_bytes: u16,
     /// Sheets in a row of cells.
     pub row_sheets: u16,
@@ -191,7 +192,7 @@ pub struct Limits {
     pub cell_sheets: u8,
     /// Fields that a layer carries: 0 where no cell tests any, 2 where a tested label is a [`STRIP`].
     pub fields: u8,
-    /// Keys decoded by one seek.
+    /// Keys decoded by one seek: from an independent key up to the last one that the frame needs.
     pub seek_keys: u16,
 }
 

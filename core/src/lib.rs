@@ -11,15 +11,66 @@
 //! - [`Player::new`] takes that memory from the caller; [`Player::seek`] makes any frame the current one, decoding
 //!   at most [`format::Limits::seek_keys`] keys; [`Player::row`] renders one row of it.
 //!
-//! A **key** holds, for every node of a sparse grid over the screen, what the camera ray through it
-//! sees: one **layer** (label, u, v) for every surface seen in the cells around the node. Playback
-//! interpolates layers in time between two keys, then, over a cell, in space; where a cell shows more than one
-//! surface (it is *torn*), the frontmost **sheet** whose chart in the source image covers the
-//! position shows. Then the texel is looked up. No triangles, no depth, no floats, no allocation; the
-//! cost of a frame does not depend on the scene.
+//! ```
+//! use cubist_core::{Bundle, Frame, MemoryError, Player};
 //!
-//! The crate is `no_std`, without alloc, without floating point, without unsafe code; no input makes it panic.
-//! A frame is a function of the bundle and the frame number alone.
+//! fn play(bundle: &Bundle<'_>, memory: &mut [u8], line: &mut [u16]) -> Result<(), MemoryError> {
+//!     let mut player = Player::new(bundle, memory)?;
+//!     for frame in 0..bundle.frames() {
+//!         player.seek(Frame(frame));
+//!         for y in 0..bundle.size().1 {
+//!             player.row(y, line);
+//!             // ... and off to the display with it.
+//!         }
+//!     }
+//!     Ok(())
+//! }
+//! ```
+//!
+//! # What is stored
+//!
+//! One **source image** has every surface that the camera ever sees, each part once, in flat **charts**. A chart's number is
+//! its **label**. What remains of the scene is where in that image each pixel of each frame looks.
+//!
+//! That is known at the **nodes** of a sparse grid over the screen, at the corners of **cells** of 4 to 32 pixels, and at sparse
+//! frames, the **keys** ([`key`]). At a key a node carries one **layer** (a label and a position u, v in texels) for every surface
+//! seen in the cells around it, also for those that its own ray does not hit: such a *ghost* is where its surface would be if it
+//! went on. For the interval between two keys, every cell lists its **sheets**: the labels seen in it, front to back
+//! ([`lists`]). A cell with one sheet is *smooth*; one with more is *torn*: outlines run through it.
+//!
+//! # How a pixel comes about
+//!
+//! 1. **Time** ([`timeline`]). Every layer of the two rows of nodes around a row of cells is interpolated between the
+//!    interval's two keys: held, straight, or along a Catmull-Rom curve that takes the key before and the one after into account
+//!    where these carry the layer too.
+//! 2. **Space.** Inside a cell each sheet's position is bilinear between its four corners. Along a row of pixels that is one
+//!    addition a pixel.
+//! 3. **Coverage.** In a torn cell the frontmost sheet that covers a pixel shows; the last covers whatever is left. A sheet covers
+//!    a pixel by one of three tests, which its list names. The *chart* test: its position lies inside its label's rectangle, and in
+//!    the mask if the chart does not fill that. The *field* test, for outlines that no chart has, such as a cone's silhouette: a
+//!    **field**, the signed distance on the screen from the outline, is above zero; layers carry it, and it is interpolated like a
+//!    position, in time always straight. Or both. What is so thin that both its sides pass through one cell is a **strip**: its
+//!    layers carry two fields, the distances from either side, and both have to be above zero.
+//! 4. **Colour.** One texel, one palette entry.
+//!
+//! No triangles, no depth, no division by it: perspective is in the keys. What a frame costs follows from the screen and the
+//! bundle's [`format::Limits`], not from how many triangles the scene had.
+//!
+//! # How keys are read
+//!
+//! A key's **record** ([`record`]) is told from the one or two keys before it ([`coder`], [`nodes`]). An *independent* key is
+//! told from nothing; decoding starts there. Decoded keys live in a ring in the caller's memory: four for cubic time, the one
+//! before the interval, its two ends and the one after, else three; the sheet lists of the last three intervals in another. In
+//! playback the next key replaces the oldest. A seek to any other place decodes from the last independent key before it, unless
+//! going on from where the ring stands takes fewer keys. On a looping path the first key follows the last, so that the ring
+//! simply goes on.
+//!
+//! # What holds
+//!
+//! The crate is `no_std`, without alloc, without floating point, without unsafe code; no input makes it panic. A frame is a
+//! function of the bundle and the frame number alone, whatever was shown before. The bytes are described in FORMAT.md.
+//! The same description of the records serves the baker's encoder, which is why [`coder`], [`lists`], [`nodes`] and
+//! [`record`] are public.
 #![no_std]
 #![deny(
     clippy::indexing_slicing,
@@ -36,6 +87,7 @@ mod cell;
 pub mod coder;
 mod coverage;
 mod error;
+mod field;
 pub mod fixed;
 pub mod format;
 mod graphics;
@@ -43,7 +95,9 @@ pub mod grid;
 pub mod key;
 pub mod lists;
 mod memory;
+pub mod nodes;
 mod player;
+mod predict;
 pub mod record;
 mod span;
 pub mod timeline;

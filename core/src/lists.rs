@@ -1,6 +1,6 @@
 //! Sheet lists: for every cell of one key interval, the labels seen in it, front to back.
 //! They are coded once an interval, from their neighbours in space and time; which layers a node
-//! carries follows from the lists of the cells around it (see `key`).
+//! carries follows from the lists of the cells around it (see `nodes`).
 
 use crate::coder::{Bits, Probability};
 use crate::format::MAX_SHEETS;
@@ -77,7 +77,7 @@ impl<'m> Lists<'m> {
         Self { most: usize::from(sheets), ..self }
     }
 
-    /// A cursor at the first cell of `row`; an empty one past the last row.
+    /// A cursor at the first cell of `row`; past the last row one that sees no sheets.
     #[must_use]
     pub fn row(&self, row: usize) -> Cursor {
         let inside = row.wrapping_add(1) < self.rows.len();
@@ -97,11 +97,11 @@ impl<'m> Lists<'m> {
         let labels = sheets.labels.get(..self.most).unwrap_or(&sheets.labels);
         let next = end.saturating_add(bytes(labels.len()));
         let Some((count, rest)) = self.data.get_mut(end..next).and_then(<[u8]>::split_first_mut) else {
-            // A list that breaks its own bound is cut off: the cells after it show nothing.
+            // A list that breaks its own bound is cut off: it and the cells after it, however small, show nothing.
             if let Some(rest) = self.data.get_mut(end..) {
                 rest.fill(0);
             }
-            return end;
+            return self.data.len();
         };
         *count = labels.len() as u8;
         for (slot, byte) in rest.iter_mut().zip(labels.iter().copied().chain(sheets.tests.to_le_bytes())) {

@@ -4,8 +4,9 @@
 use crate::Bundle;
 use crate::cell::{Layer, NodeRow, RowSheets, Sheet};
 use crate::format;
-use crate::key::{self, Key};
+use crate::key::Key;
 use crate::lists::{self, Lists};
+use crate::nodes;
 use crate::record::Stream;
 use bytemuck::Pod;
 
@@ -53,7 +54,7 @@ fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
         palette: cutter.take(256),
         stream: Stream {
             list_contexts: cutter.take(lists::CONTEXTS),
-            key_contexts: cutter.take(key::CONTEXTS),
+            key_contexts: cutter.take(nodes::CONTEXTS),
             traces: cutter.take(row_layers.saturating_mul(2)),
             keys: core::array::from_fn(|slot| match slot < slots {
                 true => Key {

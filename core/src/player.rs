@@ -49,7 +49,7 @@ pub struct Work {
 pub struct Probe {
     /// The label of the sheet that shows.
     pub label: u8,
-    /// Its position in the source image.
+    /// Its position in the source image, Q15.16 texels.
     pub at: PlayUv,
 }
 
@@ -57,9 +57,9 @@ pub struct Probe {
 #[derive(Clone, Copy, Debug)]
 struct Last {
     key: usize,
-    /// Records since the last independent one.
+    /// Records since the last independent one; 0 for that one itself.
     run: u32,
-    /// Keys decoded one after the other up to this one.
+    /// Keys decoded one after the other up to this one: as many of them as there are slots are held.
     chain: usize,
 }
 
@@ -129,8 +129,8 @@ impl<'a> Player<'a> {
 
     /// Makes `frame` the current frame; past the end it wraps on a looping bundle, else the last frame stays.
     ///
-    /// Decodes at most [`Limits::seek_keys`] keys; none while the frame stays between the same two keys, one when it
-    /// moves on to the next.
+    /// Decodes at most [`Limits::seek_keys`] keys: none while the frame stays between the same two keys, one when it moves
+    /// on past the second (none where the path's end is near). Backwards, or far ahead, it starts at an independent key.
     pub fn seek(&mut self, frame: Frame) {
         let frames = self.bundle.frames();
         let frame = if self.bundle.looping() { frame.0.checked_rem(frames).unwrap_or(0) } else { frame.0.min(frames.saturating_sub(1)) };
@@ -209,8 +209,10 @@ impl<'a> Player<'a> {
     /// Renders row `y` of the current frame as RGB565 into `out`: as many pixels as both `out` and the
     /// screen have; nothing below the screen.
     ///
-    /// At most one texel read and one coverage test a pixel and sheet of its cell; never allocates, never waits.
-    /// The first row of a row of cells also interpolates the layers of two rows of nodes.
+    /// For each pixel at most one texel read for every sheet of its cell, and a coverage test for every one but the last: with
+    /// [`Limits::row_sheets`] sheets in a row of cells, at most that times the cell's width of either. The first row of a row of
+    /// cells also interpolates the layers of two rows of nodes, or of one where the row of cells above was the last drawn: at most
+    /// [`Limits::row_layers`] each. Never allocates, never waits.
     pub fn row(&mut self, y: u32, out: &mut [u16]) {
         let texture = self.bundle.texture();
         if !self.ready(y) {

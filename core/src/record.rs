@@ -1,13 +1,15 @@
-//! A key record: the sheet lists of the interval that starts at the key, then the key's layers.
+//! A key record: the sheet lists of the interval that starts at the key (an independent key repeats those of the one that
+//! ends there), then the key's layers.
 //! Described once: the player decodes records into the caller's memory, the baker's encoder makes them.
 
 use crate::coder::{Bits, Probability};
 use crate::format::LabelRecord;
 use crate::grid::Grid;
-use crate::key::{self, Key, Setting, Source, Trace};
+use crate::key::{Key, Setting, Source};
 use crate::lists::{self, Lists};
+use crate::nodes::{self, Trace};
 
-/// Keys held at a time, at most: four to play a cubic interval. Two of them also tell the next.
+/// Keys held at a time, at most: four to play a cubic interval. Three are held always: the last two tell the next.
 pub const MAX_KEYS: usize = 4;
 /// Sheet lists held at a time: those of the intervals from the one that plays to the one after the last key.
 pub const LISTS: usize = 3;
@@ -17,17 +19,17 @@ pub const LISTS: usize = 3;
 pub struct Stream<'m> {
     /// [`lists::CONTEXTS`] of them.
     pub list_contexts: &'m mut [Probability],
-    /// [`key::CONTEXTS`] of them.
+    /// [`nodes::CONTEXTS`] of them.
     pub key_contexts: &'m mut [Probability],
-    /// Room for the layers of two rows of nodes.
+    /// Room for the layers of two rows of nodes: one trace each.
     pub traces: &'m mut [Trace],
     /// The last keys, in a ring of the first `slots`.
     pub keys: [Key<'m>; MAX_KEYS],
-    /// The lists of the intervals that start at them, in a ring too.
+    /// The lists of the intervals that start at the last of them, in a ring too.
     pub lists: [Lists<'m>; LISTS],
     /// Keys in use: at least 3, at most [`MAX_KEYS`].
     pub slots: usize,
-    /// Records coded so far.
+    /// Records coded so far; it turns both rings.
     pub turn: usize,
 }
 
@@ -49,7 +51,7 @@ pub struct Shape<L> {
 pub struct Place {
     /// The record uses no earlier one.
     pub independent: bool,
-    /// Records decoded since the last independent one.
+    /// Records since the last independent one: 0 at that one itself.
     pub run: u32,
     /// An interval ends at the key.
     pub has_before: bool,
@@ -98,7 +100,7 @@ impl<'m> Stream<'m> {
             before_that: self.key(2).filter(|_| place.run >= 2).map(|key| (key, ratio(length, length_before))),
             lists: [place.has_before.then_some(&lists_before), place.has_after.then_some(&lists_after)],
         };
-        key::code(bits, key_contexts, &setting, &mut now, traces, source);
+        nodes::code(bits, key_contexts, &setting, &mut now, traces, source);
         (self.key_contexts, self.traces) = (key_contexts, traces);
         self.put(now_slot, now, [(list_slot, lists_after), (list_before_slot, lists_before)]);
     }

@@ -28,9 +28,7 @@ impl Span {
             },
         }
     }
-}
 
-impl Span {
     /// The position `pixels` pixels on.
     const fn at(&self, pixels: usize) -> PlayUv {
         let count = pixels as i32;

@@ -7,8 +7,9 @@ use cubist_core::coder::{Decoder, Probability};
 use cubist_core::fixed::ONE;
 use cubist_core::format::{MASK, MASKED, STRIP, TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
 use cubist_core::grid::Grid;
-use cubist_core::key::{self, Key, Nothing, Trace};
+use cubist_core::key::{Key, Nothing};
 use cubist_core::lists::{self, CHART, FIELD, Lists};
+use cubist_core::nodes::{self, Trace};
 use cubist_core::record::{LISTS, MAX_KEYS, Shape, Stream};
 use cubist_core::timeline;
 
@@ -108,7 +109,7 @@ impl<'a> Reference<'a> {
         let (path, limits) = (bundle.path(), bundle.limits());
         let grid = Grid::new(path.width, path.height, path.cell_log2);
         let layers = usize::from(limits.key_layers);
-        let mut contexts = [vec![Probability::NEW; lists::CONTEXTS], vec![Probability::NEW; key::CONTEXTS]];
+        let mut contexts = [vec![Probability::NEW; lists::CONTEXTS], vec![Probability::NEW; nodes::CONTEXTS]];
         let mut traces = vec![Trace::default(); 2 * usize::from(limits.row_layers)];
         let mut key_memory: [_; MAX_KEYS] =
             std::array::from_fn(|_| (vec![0; grid.nodes() + 1], vec![0; layers], vec![0; layers], [vec![0; layers], vec![0; layers]]));

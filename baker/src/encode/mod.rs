@@ -1,6 +1,7 @@
 //! Encoding: ordered sheets, fitted layers and the source image become the bytes of a bundle.
 //! The stream is described by `cubist_core::record`; this drives it and keeps the bounds it states.
 
+mod limits;
 mod range;
 
 use crate::atlas::SourceImage;
@@ -13,9 +14,11 @@ use cubist_core::fixed::{KEY_BITS, KEY_MAX, KEY_MIN, field_code};
 use cubist_core::format::{
     ATLAS, Atlas, Envelope, FIXED, INFO, KeyEntry, LABELS, LabelRecord, Limits, MAGIC, MASK, MASKED, PATH, Path, STRIP, Section, VERSION,
 };
-use cubist_core::key::{self, Key, Source, Trace};
+use cubist_core::key::{Key, Source};
 use cubist_core::lists::{self, Lists};
+use cubist_core::nodes::{self, Trace};
 use cubist_core::record::{LISTS, MAX_KEYS, Place, Shape, Stream};
+pub use limits::Exceeded;
 use range::Encoder;
 
 /// How keys are coded.
@@ -32,7 +35,7 @@ pub struct CodingSettings {
 
 /// What goes into a bundle besides the keys.
 #[derive(Clone, Copy, Debug)]
-pub struct Frame<'a> {
+pub struct Header<'a> {
     /// Frames per second.
     pub fps: u16,
     /// A text for people.
@@ -59,24 +62,27 @@ pub struct Content<'a> {
 }
 
 /// Makes the bytes of a bundle.
-#[must_use]
-pub fn bundle(content: &Content<'_>, settings: CodingSettings, frame: Frame<'_>) -> Vec<u8> {
+///
+/// # Errors
+/// [`Exceeded`] where a key or an interval holds more than the bundle's bounds can say.
+pub fn bundle(content: &Content<'_>, settings: CodingSettings, header: Header<'_>) -> Result<Vec<u8>, Exceeded> {
     let &Content { gbuffer, grid, image, .. } = content;
     let mut labels: Vec<LabelRecord> = image.labels.iter().map(label_record).collect();
     for (record, &strip) in labels.iter_mut().zip(&content.fields.strip) {
         record.flags |= if strip { STRIP } else { 0 };
     }
-    let (table, records) = keys(content, &labels, settings);
+    let bounds = limits::of(content, &labels, settings)?;
+    let (table, records) = keys(content, &labels, settings, bounds);
     let path = Path {
         width: gbuffer.width as u16,
         height: gbuffer.height as u16,
         frames: gbuffer.frames,
-        fps: frame.fps,
+        fps: header.fps,
         looping: grid.looping,
         cell_log2: grid.grid.log2 as u8,
         time: grid.time,
         step_log2: settings.step_log2,
-        limits: limits(content, &labels, settings),
+        limits: bounds,
         table: &table,
         records: &records,
     };
@@ -97,14 +103,14 @@ pub fn bundle(content: &Content<'_>, settings: CodingSettings, frame: Frame<'_>)
     if masked {
         sections.push(section(MASK, true, &mask));
     }
-    if !frame.info.is_empty() {
-        sections.push(section(INFO, false, frame.info.as_bytes()));
+    if !header.info.is_empty() {
+        sections.push(section(INFO, false, header.info.as_bytes()));
     }
     let mut envelope = Envelope { magic: MAGIC, version: VERSION, sections: Default::default() };
     envelope.sections.extend(sections);
     let mut bytes = postcard_bytes(&envelope);
     bytes.extend(cubist_core::checksum(&bytes).to_le_bytes());
-    bytes
+    Ok(bytes)
 }
 
 fn postcard_bytes<T: serde::Serialize>(value: &T) -> Vec<u8> {
@@ -136,40 +142,9 @@ fn label_record(label: &crate::atlas::Label) -> LabelRecord {
     record
 }
 
-/// Fields that layers have to carry for the tests in `sheets`.
-fn fields_used(sheets: &Sheets, labels: &[LabelRecord]) -> u8 {
-    let per_sheet = |(list, &tests): (&Vec<u8>, &u16)| {
-        // The last sheet passes without a test: there are no bits for the ninth.
-        let tested =
-            list.iter().take(list.len().saturating_sub(1)).enumerate().filter(move |(at, _)| tests >> (2 * at) & 3 != lists::CHART);
-        tested.map(|(_, &label)| if labels[usize::from(label)].flags & STRIP != 0 { 2 } else { 1 }).max()
-    };
-    sheets.lists.iter().zip(&sheets.tests).filter_map(per_sheet).max().unwrap_or(0)
-}
-
-/// The bounds that the lists and layers keep.
-fn limits(content: &Content<'_>, labels: &[LabelRecord], settings: CodingSettings) -> Limits {
-    let &Content { grid, sheets, layers, .. } = content;
-    let (cells, nodes) = (grid.grid.cells(), grid.grid.nodes());
-    let count = |from: usize, to: usize| (layers.start[to] - layers.start[from]) as usize;
-    let most = |values: &mut dyn Iterator<Item = usize>| u16::try_from(values.max().unwrap_or(0)).unwrap_or(u16::MAX);
-    let width = grid.grid.node_columns();
-    let (back, ahead) = cubist_core::format::reach(grid.time);
-    Limits {
-        key_layers: most(&mut (0..grid.keys.len()).map(|key| count(key * nodes, (key + 1) * nodes))),
-        row_layers: most(&mut (0..grid.keys.len() * grid.grid.node_rows()).map(|row| count(row * width, (row + 1) * width))),
-        list_bytes: most(&mut sheets.lists.chunks(cells).map(|lists| lists.iter().map(|list| lists::bytes(list.len())).sum())),
-        row_sheets: most(&mut sheets.lists.chunks(grid.grid.columns).map(|lists| lists.iter().map(Vec::len).sum())),
-        fields: fields_used(sheets, labels),
-        cell_sheets: sheets.lists.iter().map(Vec::len).max().unwrap_or(1) as u8,
-        seek_keys: (settings.independent_every.clamp(1, grid.keys.len()) + back + ahead) as u16,
-    }
-}
-
 /// The key table and the records.
-fn keys(content: &Content<'_>, labels: &[LabelRecord], settings: CodingSettings) -> (Vec<u8>, Vec<u8>) {
+fn keys(content: &Content<'_>, labels: &[LabelRecord], settings: CodingSettings, bounds: Limits) -> (Vec<u8>, Vec<u8>) {
     let grid = content.grid;
-    let bounds = limits(content, labels, settings);
     let mut memory = Memory::new(grid, bounds);
     let mut stream = memory.stream();
     let shape = Shape {
@@ -212,7 +187,7 @@ impl Memory {
     fn new(grid: &KeyGrid, limits: Limits) -> Self {
         let layers = usize::from(limits.key_layers);
         Self {
-            contexts: [vec![Probability::NEW; lists::CONTEXTS], vec![Probability::NEW; key::CONTEXTS]],
+            contexts: [vec![Probability::NEW; lists::CONTEXTS], vec![Probability::NEW; nodes::CONTEXTS]],
             traces: vec![Trace::default(); 2 * usize::from(limits.row_layers)],
             keys: std::array::from_fn(|_| {
                 (vec![0; grid.grid.nodes() + 1], vec![0; layers], vec![0; layers], [vec![0; layers], vec![0; layers]])
@@ -265,7 +240,7 @@ impl Source for Wanted<'_> {
 
     fn field(&mut self, node: usize, label: u8, which: usize) -> i8 {
         let layer = self.content.layers.find(self.key * self.content.grid.grid.nodes() + node, label);
-        layer.map_or(0, |layer| field_code(libm::roundf(self.content.fields.uv[layer][which] * 256.0) as i32))
+        layer.map_or(0, |layer| field_code(libm::roundf(self.content.fields.distance[layer][which] * 256.0) as i32))
     }
 
     fn residual(&mut self, node: usize, label: u8, predicted: [i32; 2], contexts: [&[Probability]; 2]) -> [i32; 2] {

@@ -1,0 +1,67 @@
+//! The bounds that a bundle states: what the fullest key, row, interval and cell hold.
+//! Lists and layers come from the baker's stages; the bounds go into the path's header, and size the encoder's memory.
+
+use super::{CodingSettings, Content};
+use crate::sheets::Sheets;
+use cubist_core::format::{LabelRecord, Limits, STRIP, reach};
+use cubist_core::lists;
+use thiserror::Error;
+
+/// More than a bundle can hold.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+#[error("{what}: {found}, but a bundle holds at most {most}; {cure}")]
+pub struct Exceeded {
+    /// What there is too much of.
+    pub what: &'static str,
+    /// How much there is.
+    pub found: usize,
+    /// How much there can be.
+    pub most: usize,
+    /// What to do about it.
+    pub cure: &'static str,
+}
+
+const COARSER: &str = "choose larger cells (--cell, at most 32) or a smaller screen (--size)";
+const SHORTER: &str = "make keys independent more often";
+
+/// `found` as a bound of 16 bits.
+fn bound(what: &'static str, found: usize, cure: &'static str) -> Result<u16, Exceeded> {
+    u16::try_from(found).map_err(|_| Exceeded { what, found, most: usize::from(u16::MAX), cure })
+}
+
+/// Fields that layers have to carry for the tests in `sheets`.
+fn fields_used(sheets: &Sheets, labels: &[LabelRecord]) -> u8 {
+    let per_sheet = |(list, &tests): (&Vec<u8>, &u16)| {
+        // The last sheet passes without a test: there are no bits for the ninth.
+        let tested =
+            list.iter().take(list.len().saturating_sub(1)).enumerate().filter(move |(at, _)| tests >> (2 * at) & 3 != lists::CHART);
+        tested.map(|(_, &label)| if labels[usize::from(label)].flags & STRIP != 0 { 2 } else { 1 }).max()
+    };
+    sheets.lists.iter().zip(&sheets.tests).filter_map(per_sheet).max().unwrap_or(0)
+}
+
+/// The bounds that the lists and layers keep.
+pub(super) fn of(content: &Content<'_>, labels: &[LabelRecord], settings: CodingSettings) -> Result<Limits, Exceeded> {
+    let &Content { grid, sheets, layers, .. } = content;
+    let (cells, nodes, width) = (grid.grid.cells(), grid.grid.nodes(), grid.grid.node_columns());
+    // The most layers in a run of `length` nodes.
+    let most_layers = |length: usize| layers.start.iter().step_by(length).zip(layers.start.iter().skip(length).step_by(length));
+    let most_layers = |length: usize| most_layers(length).map(|(from, to)| (to - from) as usize).max().unwrap_or(0);
+    let list_bytes = |lists: &[Vec<u8>]| lists.iter().map(|list| lists::bytes(list.len())).sum();
+    let row_sheets = |lists: &[Vec<u8>]| lists.iter().map(Vec::len).sum();
+    let (back, ahead) = reach(grid.time);
+    Ok(Limits {
+        key_layers: bound("layers in a key", most_layers(nodes), COARSER)?,
+        row_layers: bound("layers in a row of nodes", most_layers(width), COARSER)?,
+        list_bytes: bound(
+            "bytes of sheet lists in a key interval",
+            sheets.lists.chunks(cells).map(list_bytes).max().unwrap_or(0),
+            COARSER,
+        )?,
+        row_sheets: bound("sheets in a row of cells", sheets.lists.chunks(grid.grid.columns).map(row_sheets).max().unwrap_or(0), COARSER)?,
+        fields: fields_used(sheets, labels),
+        // `sheets` keeps at most MAX_SHEETS, which is 9.
+        cell_sheets: sheets.lists.iter().map(Vec::len).max().unwrap_or(1) as u8,
+        seek_keys: bound("keys decoded by a seek", settings.independent_every.clamp(1, grid.keys.len()) + back + ahead, SHORTER)?,
+    })
+}

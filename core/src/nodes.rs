@@ -1,0 +1,125 @@
+//! The layers of a key, node by node: which labels each node carries follows from the sheet lists around it; positions are
+//! coded by `predict`, fields by `field`. Described once, for decoder and encoder alike: bits come from (or go to)
+//! `coder`, layers go to the caller's memory as a `key`.
+//!
+//! A node carries one layer for every label in the lists of the cells that touch it, in the interval before its key and
+//! in the one after.
+
+use crate::coder::{Bits, Probability};
+use crate::field;
+use crate::format::{LabelRecord, MAX_NODE_LAYERS};
+use crate::key::{Key, Setting, Source, Spot};
+use crate::lists::{CHART, Cursor, Lists};
+use crate::predict;
+pub use crate::predict::Trace;
+use heapless::Vec;
+
+/// Contexts a key is coded with: for positions, then for fields.
+pub const CONTEXTS: usize = predict::CONTEXTS + field::CONTEXTS;
+
+/// Codes one key's layers into `target`, in `contexts` ([`CONTEXTS`] of them). `traces` holds two rows of nodes' worth of [`Trace`]s,
+/// half of it each.
+pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
+    bits: &mut B,
+    contexts: &mut [Probability],
+    setting: &Setting<'_, '_, L>,
+    target: &mut Key<'_>,
+    traces: &mut [Trace],
+    source: &mut S,
+) {
+    let grid = setting.grid;
+    let Some((positions, fields)) = contexts.split_at_mut_checked(predict::CONTEXTS) else { return };
+    let (mut node, mut layer) = (0usize, 0usize);
+    for row in 0..grid.node_rows() {
+        let mut around = Corner::new(setting.lists, row);
+        let row_start = layer;
+        for column in 0..grid.node_columns() {
+            if let Some(start) = target.start.get_mut(node) {
+                *start = layer as u16;
+            }
+            let mut labels: Vec<Found, MAX_NODE_LAYERS> = Vec::new();
+            around.labels(setting.lists, column < grid.columns, &mut labels);
+            let end = layer.wrapping_add(labels.len());
+            // A node that breaks the key's bound carries nothing.
+            let fits = end <= target.label.len() && end.wrapping_sub(row_start) <= traces.len() / 2;
+            if !fits {
+                labels.clear();
+            }
+            for (index, found) in (layer..).zip(&labels) {
+                if let Some(slot) = target.label.get_mut(index) {
+                    *slot = found.label;
+                }
+            }
+            if let Some(start) = target.start.get_mut(node.wrapping_add(1)) {
+                *start = layer.wrapping_add(labels.len()) as u16;
+            }
+            for found in &labels {
+                let spot = Spot { node, row, column, label: found.label, layer };
+                let coded = predict::code(bits, positions, setting, target, traces, &spot, found.support, source);
+                if let Some(slot) = target.uv.get_mut(layer) {
+                    *slot = coded.0;
+                }
+                field::code(bits, fields, setting, target, &spot, found.tested, source);
+                layer = layer.wrapping_add(1);
+            }
+            node = node.wrapping_add(1);
+        }
+    }
+}
+
+/// A label in the cells around a node.
+struct Found {
+    label: u8,
+    /// How many of the cells show it.
+    support: u8,
+    /// Some cell tests its fields.
+    tested: bool,
+}
+
+/// The cells around a node as a row of nodes is walked: above and below, in the interval before and after.
+struct Corner {
+    /// The cells to the left of the node, and those to the right.
+    left: [Option<Cursor>; 4],
+    right: [Option<Cursor>; 4],
+}
+
+impl Corner {
+    fn new(lists: [Option<&Lists<'_>>; 2], row: usize) -> Self {
+        let mut right = [None; 4];
+        for (slot, (list, above)) in right.iter_mut().zip(lists.iter().flat_map(|&list| [(list, true), (list, false)])) {
+            *slot = list.and_then(|list| if above { row.checked_sub(1).map(|row| list.row(row)) } else { Some(list.row(row)) });
+        }
+        Self { left: [None; 4], right }
+    }
+
+    /// Collects the labels of the cells around the node, ascending; then moves on.
+    fn labels(&mut self, lists: [Option<&Lists<'_>>; 2], inside: bool, found: &mut Vec<Found, MAX_NODE_LAYERS>) {
+        let [before, after] = lists;
+        let owners = [before, before, after, after];
+        if !inside {
+            self.right = [None; 4];
+        }
+        for (cursors, owner) in self.left.iter().zip(&self.right).zip(owners) {
+            let Some(owner) = owner else { continue };
+            for cursor in [cursors.0, cursors.1].into_iter().flatten() {
+                let sheets = owner.sheets(*cursor);
+                for (index, &label) in sheets.labels.iter().enumerate() {
+                    let tested = sheets.test(index) != CHART;
+                    let at = found.partition_point(|other| other.label < label);
+                    match found.get_mut(at) {
+                        Some(other) if other.label == label => {
+                            other.support = other.support.saturating_add(1);
+                            other.tested |= tested;
+                        }
+                        // Labels past the bound of a node are left out; its cells do without them.
+                        _ => drop(found.insert(at, Found { label, support: 1, tested })),
+                    }
+                }
+            }
+        }
+        self.left = self.right;
+        for (cursor, owner) in self.right.iter_mut().zip(owners) {
+            *cursor = cursor.zip(owner).map(|(cursor, owner)| cursor.next(owner));
+        }
+    }
+}

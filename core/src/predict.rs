@@ -1,0 +1,227 @@
+//! How the position of a layer is coded: what is already known predicts it, the rest is a residual.
+//! Layers come from `nodes`; positions go into the key, what they say about their neighbours into traces.
+//!
+//! A position is told from the same layer in the two keys before and the same label at the nodes west and north of it.
+//! Several predictors compete; the one that was best at those neighbours is used. How wrong they were there chooses the
+//! contexts of the residual.
+
+use crate::coder::{self, Bits, NUMBER_CONTEXTS, Probability};
+use crate::fixed::{KEY_BITS, KEY_MAX, KEY_MIN, KeyUv};
+use crate::format::{FIXED, LabelRecord};
+use crate::grid::Grid;
+use crate::key::{Key, Setting, Source, Spot};
+
+/// Competing predictors.
+const PREDICTORS: usize = 8;
+/// Classes of how wrong the predictions were around a layer.
+const NOISE_CLASSES: usize = 9;
+/// Classes of how many of the eight cells around a node show the layer's label.
+const SUPPORT_CLASSES: usize = 2;
+/// Contexts positions are coded with.
+pub const CONTEXTS: usize = SUPPORT_CLASSES * NOISE_CLASSES * 2 * NUMBER_CONTEXTS;
+
+/// Codes the position of the layer at `spot` in `contexts` ([`CONTEXTS`] of them): the best prediction, and a residual. `support` of the
+/// cells around the node show its label. Its trace joins `traces`.
+#[expect(clippy::too_many_arguments, reason = "the key's state, its memory and the layer's place are three different owners")]
+pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
+    bits: &mut B,
+    contexts: &mut [Probability],
+    setting: &Setting<'_, '_, L>,
+    key: &Key<'_>,
+    traces: &mut [Trace],
+    spot: &Spot,
+    support: u8,
+    source: &mut S,
+) -> KeyUv {
+    let record = (setting.label)(spot.label);
+    if record.flags & FIXED != 0 {
+        return fixed(&record, spot, setting.grid.log2);
+    }
+    let neighbours = Neighbours::new(setting.grid, key, traces, spot);
+    let candidates = Candidates::new(setting, &neighbours, spot);
+    let (predicted, noise) = candidates.choose(&neighbours, &record);
+    let round = |x: i32| {
+        let half = (1i32 << setting.step_log2) >> 1;
+        (x.clamp(KEY_MIN, KEY_MAX).wrapping_add(half)) >> setting.step_log2 << setting.step_log2
+    };
+    let predicted = predicted.map(round);
+    let class = usize::from(support < 5).wrapping_mul(NOISE_CLASSES).wrapping_add(noise);
+    let at = class.wrapping_mul(2 * NUMBER_CONTEXTS);
+    let Some((along_u, rest)) = contexts.get_mut(at..).and_then(|c| c.split_at_mut_checked(NUMBER_CONTEXTS)) else { return KeyUv(0) };
+    let Some((along_v, _)) = rest.split_at_mut_checked(NUMBER_CONTEXTS) else { return KeyUv(0) };
+    let [u, v] = source.residual(spot.node, spot.label, predicted, [along_u, along_v]);
+    let residual = [coder::number(bits, along_u, u), coder::number(bits, along_v, v)];
+    let [u, v] = [0, 1].map(|axis: usize| {
+        let (predicted, residual) = (predicted.get(axis).copied().unwrap_or(0), residual.get(axis).copied().unwrap_or(0));
+        predicted.wrapping_add(residual.wrapping_shl(setting.step_log2))
+    });
+    let uv = KeyUv::new(u, v);
+    let trace = candidates.trace(uv, residual, setting.step_log2);
+    if let Some(slot) = trace_index(key, setting.grid, traces.len(), spot.row, spot.layer).and_then(|index| traces.get_mut(index)) {
+        *slot = trace;
+    }
+    uv
+}
+
+/// What the coding of a layer leaves behind for its neighbours, in caller's memory.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Trace {
+    /// How far off each predictor was, steps, saturating.
+    error: [u8; PREDICTORS],
+    /// Position less temporal prediction, 1/32 texel, saturating.
+    correction: [i16; 2],
+    /// The residual that was coded, steps, saturating.
+    noise: u8,
+    /// 1: there was a temporal prediction.
+    temporal: u8,
+    /// The trace keeps a multiple of its alignment.
+    unused: [u8; 2],
+}
+
+/// The position of a screen-fixed layer at a node: an affine function of the screen position.
+fn fixed(record: &LabelRecord, spot: &Spot, log2: u32) -> KeyUv {
+    let along = |origin: u16, step: u16, index: usize| {
+        // index << log2 <= 4096 + 32 pixels, step < 2^16 of 1/16384 texel: the product fits 2^29.
+        let offset = (index as i32).wrapping_shl(log2).wrapping_mul(i32::from(step)) >> (14 - KEY_BITS);
+        i32::from(origin).wrapping_add(offset)
+    };
+    KeyUv::new(along(record.origin_u, record.step_u, spot.column), along(record.origin_v, record.step_v, spot.row))
+}
+
+/// Traces of even rows of nodes are in the first half, those of odd rows in the second.
+fn trace_index(key: &Key<'_>, grid: Grid, length: usize, row: usize, layer: usize) -> Option<usize> {
+    let first = key.start.get(row.wrapping_mul(grid.node_columns())).map(|&at| usize::from(at))?;
+    Some(layer.wrapping_sub(first).wrapping_add(if row & 1 == 1 { length / 2 } else { 0 }))
+}
+
+/// A layer of the same label at a neighbouring node.
+#[derive(Clone, Copy)]
+struct Neighbour {
+    uv: [i32; 2],
+    trace: Trace,
+}
+
+/// The neighbours that are already coded: west, north, north-east, north-west, and one further west and north.
+struct Neighbours {
+    west: Option<Neighbour>,
+    north: Option<Neighbour>,
+    north_east: Option<Neighbour>,
+    north_west: Option<Neighbour>,
+    far_west: Option<[i32; 2]>,
+    far_north: Option<[i32; 2]>,
+}
+
+impl Neighbours {
+    fn new(grid: Grid, key: &Key<'_>, traces: &[Trace], spot: &Spot) -> Self {
+        let width = grid.node_columns();
+        let at = |left: usize, up: usize| {
+            let inside = spot.column >= left && spot.row >= up;
+            inside.then(|| spot.node.wrapping_sub(left).wrapping_sub(up.wrapping_mul(width)))
+        };
+        let near = |node: Option<usize>, row: usize| {
+            let layer = key.find(node?, spot.label)?;
+            let uv = key.uv(layer);
+            let trace = traces.get(trace_index(key, grid, traces.len(), row, layer)?).copied()?;
+            Some(Neighbour { uv: [uv.u(), uv.v()], trace })
+        };
+        let far = |node: Option<usize>| key.position(node?, spot.label);
+        let above = spot.row.wrapping_sub(1);
+        let east = (spot.row > 0 && spot.column.wrapping_add(1) < width).then(|| spot.node.wrapping_sub(width).wrapping_add(1));
+        Self {
+            west: near(at(1, 0), spot.row),
+            north: near(at(0, 1), above),
+            north_east: near(east, above),
+            north_west: near(at(1, 1), above),
+            far_west: far(at(2, 0)),
+            far_north: far(at(0, 2)),
+        }
+    }
+
+    fn all(&self) -> impl Iterator<Item = &Neighbour> {
+        [&self.west, &self.north, &self.north_east, &self.north_west].into_iter().flatten()
+    }
+}
+
+/// The predictors' answers.
+struct Candidates {
+    uv: [Option<[i32; 2]>; PREDICTORS],
+    temporal: Option<[i32; 2]>,
+}
+
+fn plus(a: [i32; 2], b: [i32; 2]) -> [i32; 2] {
+    let ([a, b], [c, d]) = (a, b);
+    [a.wrapping_add(c), b.wrapping_add(d)]
+}
+
+fn minus(a: [i32; 2], b: [i32; 2]) -> [i32; 2] {
+    let ([a, b], [c, d]) = (a, b);
+    [a.wrapping_sub(c), b.wrapping_sub(d)]
+}
+
+/// The mean of up to four values, rounded towards minus infinity.
+fn mean(values: impl Iterator<Item = [i32; 2]>) -> Option<[i32; 2]> {
+    let (sum, count) = values.fold(([0, 0], 0i32), |(sum, count), value| (plus(sum, value), count.wrapping_add(1)));
+    (count > 0).then(|| sum.map(|x| x.checked_div_euclid(count).unwrap_or(0)))
+}
+
+impl Candidates {
+    fn new<L>(setting: &Setting<'_, '_, L>, around: &Neighbours, spot: &Spot) -> Self {
+        let held = setting.before.and_then(|k| k.position(spot.node, spot.label));
+        let older = setting.before_that.and_then(|(k, ratio)| Some((k.position(spot.node, spot.label)?, ratio)));
+        let temporal = held.map(|held| match older {
+            // Positions differ by less than 2^16 and the ratio is at most 2^12: the product fits 2^28.
+            Some((older, ratio)) => plus(held, minus(held, older).map(|d| d.wrapping_mul(ratio) >> 8)),
+            None => held,
+        });
+        let correction = |n: &Neighbour| (n.trace.temporal == 1).then(|| n.trace.correction.map(i32::from));
+        let corrected = temporal.zip(mean(around.all().filter_map(correction)));
+        let plane = |w: [i32; 2], n: [i32; 2], nw: [i32; 2]| minus(plus(w, n), nw);
+        let corner = around.west.as_ref().zip(around.north.as_ref()).zip(around.north_west.as_ref());
+        let corner_correction = corner.and_then(|((w, n), nw)| Some(plane(correction(w)?, correction(n)?, correction(nw)?)));
+        let line = |near: Option<Neighbour>, far: Option<[i32; 2]>| near.zip(far).map(|(near, far)| minus(plus(near.uv, near.uv), far));
+        let lines = [line(around.west, around.far_west), line(around.north, around.far_north)];
+        let uv = [
+            temporal,
+            corrected.map(|(t, c)| plus(t, c)),
+            corrected.map(|(t, c)| plus(t, c.map(|x| x >> 1))),
+            temporal.zip(corner_correction).map(|(t, c)| plus(t, c)),
+            corner.map(|((w, n), nw)| plane(w.uv, n.uv, nw.uv)),
+            mean(lines.into_iter().flatten()),
+            mean(around.all().map(|n| n.uv)),
+            older.and(held),
+        ];
+        Self { uv, temporal }
+    }
+
+    /// The candidate that was best at the neighbours, and the class of how noisy they were.
+    fn choose(&self, around: &Neighbours, record: &LabelRecord) -> ([i32; 2], usize) {
+        let mut best: Option<(u32, [i32; 2])> = None;
+        for (index, candidate) in self.uv.iter().enumerate() {
+            let Some(candidate) = candidate else { continue };
+            let error = around.all().map(|n| u32::from(n.trace.error.get(index).copied().unwrap_or(255))).fold(0u32, u32::wrapping_add);
+            if best.is_none_or(|(least, _)| error < least) {
+                best = Some((error, *candidate));
+            }
+        }
+        let (noise, count) = around.all().fold((0u32, 0u32), |(sum, n), x| (sum.wrapping_add(u32::from(x.trace.noise)), n.wrapping_add(1)));
+        let class = match (noise.wrapping_mul(2)).checked_div(count) {
+            None => NOISE_CLASSES - 1,
+            Some(twice) => [1, 2, 4, 8, 14, 26, 60].iter().take_while(|&&limit| twice >= limit).count(),
+        };
+        let centre = || {
+            let middle = |a: u16, b: u16| i32::from(a).wrapping_add(i32::from(b)).wrapping_shl(KEY_BITS) >> 1;
+            [middle(record.left, record.right), middle(record.top, record.bottom)]
+        };
+        (best.map_or_else(centre, |(_, uv)| uv), class)
+    }
+
+    fn trace(&self, uv: KeyUv, residual: [i32; 2], step_log2: u32) -> Trace {
+        let actual = [uv.u(), uv.v()];
+        let size = |d: [i32; 2]| d.iter().map(|x| x.unsigned_abs()).fold(0u32, u32::saturating_add);
+        let byte = |x: u32| x.min(255) as u8;
+        let error = self.uv.map(|candidate| candidate.map_or(40, |c| byte(size(minus(actual, c)) >> step_log2)));
+        let correction = self.temporal.map_or([0, 0], |t| minus(actual, t)).map(|x| x.clamp(-32_768, 32_767) as i16);
+        Trace { error, correction, noise: byte(size(residual)), temporal: u8::from(self.temporal.is_some()), unused: [0; 2] }
+    }
+}
