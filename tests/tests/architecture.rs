@@ -153,6 +153,14 @@ fn the_core_imports_downwards() {
 }
 
 #[test]
+fn the_document_lists_the_cores_modules_in_their_order() {
+    let document = source::file("ARCHITECTURE.md");
+    let listed = document.split("| module | |").nth(1).and_then(|table| table.split("\n\n").next()).unwrap_or("");
+    let modules: Vec<&str> = listed.split("\n| `").skip(1).filter_map(|row| row.split('`').next()).collect();
+    assert_eq!(modules, ORDER[..ORDER.len() - 1], "ARCHITECTURE.md lists other modules than ORDER, or in another order");
+}
+
+#[test]
 fn ci_runs_what_the_readme_promises() {
     let (readme, ci) = (source::file("README.md"), source::file(".ci/run"));
     assert!(readme.contains("\ncargo test --workspace\n"), "the README's test command has changed");
