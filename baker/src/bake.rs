@@ -157,9 +157,10 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let Atlas { image, gbuffer, .. } = &flat.atlas;
     let grid = KeyGrid::new(gbuffer, settings.cell.trailing_zeros() as u8, settings.key_interval, scene.playback.looping, settings.time);
     // In small cells and short intervals a few pixels are much.
-    let least = settings.least_pixels.min(settings.cell * settings.cell * settings.key_interval / 64).max(1);
+    let volume = settings.cell * settings.cell * settings.key_interval;
+    let least = if volume < 512 { settings.least_pixels.min(volume / 64).max(1) } else { settings.least_pixels };
     progress("finding sheets", 0.0);
-    let Folded { gbuffer, labels } = folds::unfold(gbuffer, &flat.tears, &grid, &image.labels, 2 * least);
+    let Folded { gbuffer, labels } = folds::unfold(gbuffer, &flat.tears, &grid, &image.labels, least.saturating_mul(2));
     let (gbuffer, image) = (&gbuffer, &SourceImage { labels, ..image.clone() });
     let mut sheets = sheets::find(gbuffer, &grid, least);
     let layers = Layers::of(&grid, &sheets);

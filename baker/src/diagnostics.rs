@@ -1,9 +1,9 @@
 //! Pictures that show what a bake did: the source image, its covered texels, exact frames next to played ones.
 //! A finished job comes in; PNG files go out.
 
-use crate::files::write_png;
 use anyhow::Result;
 use cubist_baker::atlas::SourceImage;
+use cubist_baker::files::write_png;
 use cubist_baker::job::Baked;
 use cubist_baker::truth::spread;
 use cubist_baker::verify;

@@ -1,12 +1,17 @@
-//! Files that are written whole or not at all, also when the program is interrupted.
-//! Bytes and pictures come in; they go to a temporary file in the target's own folder, which is renamed when it is complete.
+//! Files that are written whole or not at all, also when the program is interrupted; files read within bounds.
+//! Bytes and pictures come in from both programs; they go to a temporary file in the target's own folder, which is renamed
+//! when it is complete. Devices and pipes, which cannot be renamed over, are written to directly.
 
 use anyhow::{Context, Result, ensure};
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
-use std::io::{BufWriter, Write};
+use std::fs::File;
+use std::io::{BufWriter, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use tempfile::NamedTempFile;
+
+/// No input file may be longer, bytes.
+const MAX_FILE: u64 = 2 << 30;
 
 /// Temporary files that are being written.
 static OPEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
@@ -32,6 +37,46 @@ pub fn clean_up_when_interrupted() -> Result<()> {
     .context("Ctrl-C cannot be caught")
 }
 
+/// Opens a file to read, and tells its length in bytes.
+///
+/// # Errors
+/// What is wrong with it and what to do, without its name: it is not there, no plain file (a device may never end, a pipe
+/// may never begin), too long, or not ours to read.
+pub fn open_to_read(path: &Path) -> Result<(File, u64), String> {
+    let denied = |e: std::io::Error| match e.kind() {
+        ErrorKind::NotFound if path.to_string_lossy().contains("://") => {
+            "no such file: addresses are not fetched: download it and give the file's path".to_owned()
+        }
+        ErrorKind::NotFound => "no such file: check the path".to_owned(),
+        ErrorKind::PermissionDenied => format!("cannot be read ({e}): check its permissions"),
+        _ => format!("cannot be read ({e})"),
+    };
+    let meta = std::fs::metadata(path).map_err(denied)?;
+    if meta.is_dir() {
+        return Err("is a directory; expected a file".to_owned());
+    }
+    if !meta.is_file() {
+        return Err("is a device or a pipe; expected a file: save what it gives to a file first".to_owned());
+    }
+    if meta.len() > MAX_FILE {
+        return Err(format!("{} bytes; at most {MAX_FILE} are read: make it smaller", meta.len()));
+    }
+    Ok((File::open(path).map_err(denied)?, meta.len()))
+}
+
+/// The bytes of a file.
+///
+/// # Errors
+/// Those of [`open_to_read`], or the system's while reading.
+pub fn read(path: &Path) -> Result<Vec<u8>, String> {
+    let (file, length) = open_to_read(path)?;
+    let mut bytes = Vec::new();
+    let cannot = |e: &dyn std::fmt::Display| format!("cannot be read ({e})");
+    bytes.try_reserve(length as usize).map_err(|e| cannot(&e))?;
+    file.take(MAX_FILE).read_to_end(&mut bytes).map_err(|e| cannot(&e))?;
+    Ok(bytes)
+}
+
 /// Takes a temporary file off the list, whatever happens to it.
 struct Listed(PathBuf);
 
@@ -43,12 +88,13 @@ impl Drop for Listed {
 
 /// Makes the folder of `path` and a temporary file in it, which is on the list for as long as the second value lives.
 fn begin(path: &Path) -> Result<(NamedTempFile, Listed)> {
+    let named = !path.as_os_str().to_string_lossy().ends_with(std::path::is_separator);
+    ensure!(named && !path.is_dir(), "{}: expected a file's name, found a folder; add a name", path.display());
     let folder = match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
     std::fs::create_dir_all(folder).with_context(|| format!("{}: the folder cannot be made", folder.display()))?;
-    ensure!(!path.is_dir(), "{}: expected a file's name, found a folder; add a name", path.display());
     let mut builder = tempfile::Builder::new();
     builder.prefix(".cubist-").suffix(".tmp");
     // A temporary file is private by default; the finished one follows the user's umask like any other.
@@ -61,12 +107,49 @@ fn begin(path: &Path) -> Result<(NamedTempFile, Listed)> {
     Ok((file, listed))
 }
 
+/// Whether two names lead to the same file, there or not yet.
+#[must_use]
+pub fn same(a: &Path, b: &Path) -> bool {
+    let whole = |path: &Path| -> PathBuf {
+        let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        match (path.canonicalize(), path.parent().map(Path::canonicalize), path.file_name()) {
+            (Ok(path), ..) => path,
+            (_, Some(Ok(folder)), Some(name)) => folder.join(name),
+            _ => path,
+        }
+    };
+    whole(a) == whole(b)
+}
+
+/// Opens `path` if it is there and is no file but a device or a pipe, such as /dev/null: a file must not take its place.
+fn device(path: &Path) -> Result<Option<File>> {
+    match std::fs::metadata(path) {
+        Ok(meta) if !meta.is_file() && !meta.is_dir() => {
+            let file = File::options().write(true).open(path);
+            file.map(Some).with_context(|| format!("{}: the device cannot be written to", path.display()))
+        }
+        // What is not there, or cannot be looked at, is for the temporary file to say.
+        _ => Ok(None),
+    }
+}
+
 /// Says now, before long work, if `path` could not be written after it.
 ///
 /// # Errors
 /// The path and why it cannot be written.
 pub fn check(path: &Path) -> Result<()> {
-    begin(path).map(drop)
+    if device(path)?.is_none() {
+        begin(path)?;
+    }
+    Ok(())
+}
+
+/// Makes `folder`, and says now, before long work, if files could not be written into it after it.
+///
+/// # Errors
+/// The folder and why it cannot be made or written to.
+pub fn check_folder(folder: &Path) -> Result<()> {
+    begin(&folder.join("check")).map(drop)
 }
 
 /// Writes `path` through `fill`; folders on the way are made. When `fill` fails, `path` stays as it was.
@@ -74,12 +157,18 @@ pub fn check(path: &Path) -> Result<()> {
 /// # Errors
 /// What `fill` says, or the path and why it cannot be written.
 pub fn write_with(path: &Path, fill: impl FnOnce(&mut dyn Write) -> Result<()>) -> Result<()> {
+    let failed = || format!("{}: writing failed", path.display());
+    if let Some(file) = device(path)? {
+        let mut writer = BufWriter::new(file);
+        fill(&mut writer)?;
+        return writer.flush().with_context(failed);
+    }
     let (file, _listed) = begin(path)?;
     let mut writer = BufWriter::new(file);
     fill(&mut writer)?;
-    let file = writer.into_inner().map_err(|e| e.into_error()).with_context(|| format!("{}: writing failed", path.display()))?;
+    let file = writer.into_inner().map_err(|e| e.into_error()).with_context(failed)?;
     let _whole = open();
-    file.persist(path).with_context(|| format!("{}: the finished file cannot be put in its place", path.display()))?;
+    file.persist(path).map_err(|e| e.error).with_context(|| format!("{}: the finished file cannot be put in its place", path.display()))?;
     Ok(())
 }
 
@@ -121,6 +210,58 @@ mod tests {
         assert_eq!(std::fs::read(&path).unwrap(), b"first");
         assert_eq!(std::fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
         assert!(open().iter().all(|file| !file.starts_with(dir.path())));
+    }
+
+    #[test]
+    fn a_name_that_ends_like_a_folder_is_refused_before_anything_is_made() {
+        let dir = tempfile::tempdir().unwrap();
+        let error = check(&dir.path().join("new/")).unwrap_err();
+        assert!(error.to_string().contains("expected a file's name"), "{error:#}");
+        assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn the_same_file_has_many_names() {
+        let dir = tempfile::tempdir().unwrap();
+        let file = dir.path().join("a.obj");
+        let again = dir.path().join("..").join(dir.path().file_name().unwrap()).join("a.obj");
+        assert!(same(&file, &again), "not there yet");
+        std::fs::write(&file, "x").unwrap();
+        assert!(same(&file, &again));
+        assert!(!same(&file, &dir.path().join("b.obj")));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn devices_are_written_to_and_never_replaced() {
+        use std::os::unix::fs::FileTypeExt;
+        let null = Path::new("/dev/null");
+        check(null).unwrap();
+        write(null, b"gone").unwrap();
+        assert!(std::fs::metadata(null).unwrap().file_type().is_char_device());
+        let full = Path::new("/dev/full");
+        if full.exists() {
+            let error = write(full, b"no room").unwrap_err();
+            assert!(format!("{error:#}").starts_with("/dev/full: writing failed: No space left"), "{error:#}");
+            assert!(std::fs::metadata(full).unwrap().file_type().is_char_device());
+        }
+    }
+
+    #[test]
+    fn what_never_ends_is_not_read() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("file.bin");
+        std::fs::write(&path, b"whole").unwrap();
+        assert_eq!(read(&path).unwrap(), b"whole");
+        assert_eq!(read(dir.path()).unwrap_err(), "is a directory; expected a file");
+        assert_eq!(read(&dir.path().join("gone")).unwrap_err(), "no such file: check the path");
+        assert!(read(Path::new("http://example.com/a.glb")).unwrap_err().contains("download it"));
+        if cfg!(unix) {
+            assert!(read(Path::new("/dev/zero")).unwrap_err().contains("is a device"));
+        }
+        // A sparse file: long without taking room.
+        File::create(&path).unwrap().set_len(MAX_FILE + 1).unwrap();
+        assert!(read(&path).unwrap_err().contains("at most"));
     }
 
     #[test]

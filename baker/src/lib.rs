@@ -9,6 +9,7 @@ pub mod camera;
 pub mod chart;
 pub mod encode;
 pub mod fields;
+pub mod files;
 pub mod fit;
 pub mod folds;
 pub mod gbuffer;

@@ -4,15 +4,14 @@
 
 mod cli;
 mod diagnostics;
-mod files;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser};
 use cli::{Bake, Cli, Command, Inspect, Playback, Throughput};
 use cubist_baker::inspect::Inspection;
 use cubist_baker::scene::Scene;
-use cubist_baker::{job, report, scene, trace};
+use cubist_baker::{files, job, report, scene, trace};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 use std::io::{IsTerminal, Write};
@@ -40,9 +39,13 @@ fn main() -> ExitCode {
 fn bake(name: &str, output: &Path, args: &Bake) -> Result<()> {
     files::clean_up_when_interrupted()?;
     threads(args.threads)?;
+    distinct(name, output, args.report.as_deref());
     files::check(output)?;
     if let Some(path) = &args.report {
         files::check(path)?;
+    }
+    if let Some(folder) = &args.diagnostics {
+        files::check_folder(folder)?;
     }
     let start = Instant::now();
     let scene = load(name, &args.playback)?;
@@ -70,10 +73,25 @@ fn bake(name: &str, output: &Path, args: &Bake) -> Result<()> {
     print(&aligned(&report::table(&baked.report)))
 }
 
+/// Refuses, as wrong usage, to write over the scene, or the report over the bundle.
+fn distinct(scene: &str, output: &Path, report: Option<&Path>) {
+    let clash = if files::same(output, Path::new(scene)) {
+        Some(format!("-o {}: that is the scene, which the bundle would replace; name another file", output.display()))
+    } else {
+        report.and_then(|report| {
+            let other = [("scene", Path::new(scene)), ("bundle", output)].into_iter().find(|(_, path)| files::same(report, path))?.0;
+            Some(format!("--report {}: that is the {other}, which the report would replace; name another file", report.display()))
+        })
+    };
+    if let Some(clash) = clash {
+        Cli::command().error(ErrorKind::ArgumentConflict, clash).exit();
+    }
+}
+
 fn inspect(args: &Inspect) -> Result<()> {
     let name = args.bundle.display();
-    let bytes = std::fs::read(&args.bundle).with_context(|| format!("{name}: the bundle cannot be read"))?;
-    let inspection = Inspection::of(&bytes).with_context(|| name.to_string())?;
+    let bytes = files::read(&args.bundle).map_err(|what| anyhow!("{name}: {what}"))?;
+    let inspection = Inspection::of(&bytes).map_err(|e| anyhow!("{name}: {e}; bake it afresh with `cubist-bake SCENE -o OUT.cubist`"))?;
     print(&if args.json { serde_json::to_string_pretty(&inspection)? + "\n" } else { inspection.text() })
 }
 

@@ -203,6 +203,16 @@ impl Report {
     }
 }
 
+/// What keeps surfaces too small for cells of `cell` pixels and keys every `interval` frames.
+fn finer(cell: u32, interval: u32) -> &'static str {
+    match (cell, interval) {
+        (5.., _) => "smaller cells (--cell) keep them",
+        // There are no smaller cells than of 4 pixels.
+        (_, 2..) => "a shorter --key-interval keeps them",
+        _ => "a larger --size keeps them",
+    }
+}
+
 /// What the pipeline itself warns of.
 fn warnings(origin: &Origin<'_>) -> Vec<String> {
     let Origin { scene, flat, encoded, settings } = origin;
@@ -210,8 +220,9 @@ fn warnings(origin: &Origin<'_>) -> Vec<String> {
     let mut out = Vec::new();
     let dropped = 100.0 * encoded.dropped_pixels as f64 / flat.rays.max(1) as f64;
     if dropped > DROPPED_PERCENT {
+        let cure = finer(settings.cell, settings.key_interval);
         out.push(format!(
-            "{dropped:.2} % of the pixels show a surface too small for its cell of {0} x {0} pixels x {1} frames; they show a neighbour instead; smaller cells (--cell) keep them",
+            "{dropped:.2} % of the pixels show a surface too small for its cell of {0} x {0} pixels x {1} frames; they show a neighbour instead; {cure}",
             settings.cell, settings.key_interval
         ));
     }
@@ -319,6 +330,13 @@ pub fn table(report: &Report) -> Vec<(String, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn advice_can_be_followed() {
+        assert!(finer(8, 8).contains("--cell"));
+        assert!(finer(4, 8).contains("--key-interval"));
+        assert!(finer(4, 1).contains("--size"));
+    }
 
     #[test]
     fn thousands_stand_apart() {

@@ -295,7 +295,7 @@ fn an_index_out_of_range_names_mesh_primitive_and_index() {
     let positions = b.floats(&SQUARE, "VEC3", 3);
     let indices = b.shorts(&[0, 1, 99]);
     b.roof(json!({ "attributes": { "POSITION": positions }, "indices": indices }));
-    assert!(b.error().ends_with("village.glb: mesh \"roof\": primitive 0: index 99 of 4 vertices"), "{}", b.error());
+    assert!(b.error().ends_with("village.glb: mesh \"roof\": primitive 0: index 99 of 4 vertices: export the file again"), "{}", b.error());
 }
 
 #[test]

@@ -33,8 +33,8 @@ pub fn load(path: Option<&Path>) -> Result<Loaded> {
     if ending.is_some_and(|e| SCENES.contains(&e.as_str())) {
         return baked(name, Scene::File(path));
     }
-    let bytes = std::fs::read(path)
-        .with_context(|| format!("{name}: cannot be read; expected a bundle (made by `cubist-bake SCENE -o OUT.cubist`)"))?;
+    let bytes = cubist_baker::files::read(path)
+        .map_err(|what| anyhow!("{name}: {what}; expected a bundle (made by `cubist-bake SCENE -o OUT.cubist`)"))?;
     Ok(Loaded { name, bytes, rows: Vec::new() })
 }
 

@@ -1,5 +1,6 @@
 //! `cubist-player`: a bundle in; a window, pictures or figures out.
-//! The command line comes from `cli`; bytes from `input`; the exit code is 0, 1 (the input is at fault) or 2 (usage).
+//! The command line comes from `cli`; bytes from `input`; the exit code is 0, 1 (the input is at fault), 2 (usage)
+//! or 130 (interrupted).
 
 mod bake;
 mod canvas;
@@ -24,6 +25,7 @@ mod window;
 use anyhow::Result;
 use clap::Parser;
 use cli::{Cli, Command, Show, Usage};
+use cubist_baker::files::clean_up_when_interrupted;
 use cubist_core::{Bundle, Player};
 use input::Loaded;
 use stage::Stage;
@@ -33,13 +35,13 @@ use std::time::Duration;
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
-    let result = match &cli.command {
+    let result = clean_up_when_interrupted().and_then(|()| match &cli.command {
         Some(Command::Render(args)) => with_player(Some(&args.bundle), |_, _, mut player| render::run(&mut player, args)),
         Some(Command::Measure(args)) => {
             with_player(Some(&args.bundle), |loaded, bundle, mut player| measure::run(loaded, bundle, &mut player, args.json))
         }
         None => show(&cli.show),
-    };
+    });
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

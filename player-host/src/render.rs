@@ -2,11 +2,12 @@
 //! A player comes in; files go out through `files`, so that each is whole or not there.
 
 use crate::cli::{Render, Usage};
-use crate::files::{write_png, write_with};
+use crate::files::write_png;
 use crate::input::print;
 use crate::picture::Picture;
 use crate::progress::progress;
 use anyhow::{Context, Result};
+use cubist_baker::files::{same, write_with};
 use cubist_core::Player;
 use image::codecs::gif::{GifEncoder, Repeat};
 use image::{Delay, DynamicImage};
@@ -36,6 +37,11 @@ pub fn run(player: &mut Player<'_>, args: &Render) -> Result<()> {
         gif: args.gif.as_deref(),
         scale: args.scale,
     };
+    if let Some(gif) = plan.gif
+        && same(gif, &args.bundle)
+    {
+        return Err(Usage(format!("--gif {}: that is the bundle, which the GIF would replace; name another file", gif.display())).into());
+    }
     write(player, &plan)
 }
 

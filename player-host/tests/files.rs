@@ -123,7 +123,7 @@ fn messages_name_the_file_and_the_exit_code_tells_whose_fault_it_is() {
     damaged[100] ^= 1;
     std::fs::write(dir.path().join("damaged.cubist"), damaged).unwrap();
     for (arguments, code, message) in [
-        (vec!["measure", "gone.cubist"], 1, "gone.cubist: cannot be read"),
+        (vec!["measure", "gone.cubist"], 1, "gone.cubist: no such file"),
         (vec!["measure", "text.cubist"], 1, "text.cubist: not a Cubist bundle"),
         (vec!["damaged.cubist"], 1, "damaged.cubist: damaged: checksum"),
         (vec!["render", "film.cubist", "--out", "film.cubist"], 1, "film.cubist: the folder cannot be made"),
@@ -137,4 +137,41 @@ fn messages_name_the_file_and_the_exit_code_tells_whose_fault_it_is() {
         assert!(error.contains(message), "{arguments:?}: {error}");
     }
     assert_eq!(names(dir.path()), ["damaged.cubist", "film.cubist", "text.cubist"], "a failed run leaves nothing");
+}
+
+#[test]
+fn the_bundle_is_not_written_over() {
+    let dir = folder();
+    let output = run(dir.path(), &["render", "film.cubist", "--gif", "./film.cubist"]);
+    assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(std::fs::read(dir.path().join("film.cubist")).unwrap(), bundle());
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_render_leaves_no_half_file() {
+    let dir = folder();
+    // A scale that takes seconds, so that the signal comes in the middle.
+    let mut child = Command::new(env!("CARGO_BIN_EXE_cubist-player"))
+        .current_dir(dir.path())
+        .args(["render", "film.cubist", "--gif", "new/film.gif", "--scale", "16"])
+        .spawn()
+        .unwrap();
+    let begun = || std::fs::read_dir(dir.path().join("new")).is_ok_and(|mut files| files.next().is_some());
+    while !begun() {
+        assert!(child.try_wait().unwrap().is_none(), "done before it was interrupted");
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert!(names(&dir.path().join("new")).is_empty());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_device_is_no_bundle() {
+    let dir = folder();
+    let output = run(dir.path(), &["measure", "/dev/zero"]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(String::from_utf8_lossy(&output.stderr).contains("/dev/zero: is a device or a pipe"));
 }

@@ -13,7 +13,7 @@ use std::sync::Arc;
 
 /// Loads a scene file. Errors name the file, the line, the key and the cure.
 pub(crate) fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneError> {
-    let bytes = picture::read_file(path).map_err(|what| SceneError::Read { file: path.to_owned(), what })?;
+    let bytes = crate::files::read(path).map_err(|what| SceneError::Read { file: path.to_owned(), what })?;
     let text = String::from_utf8(bytes)
         .map_err(|e| SceneError::Read { file: path.to_owned(), what: format!("not UTF-8 text ({}): save it as UTF-8", e.utf8_error()) })?;
     let source = Source { file: path, text: text.trim_start_matches('\u{feff}') };
@@ -310,7 +310,7 @@ fn background(source: &Source<'_>, file: &File, warnings: &mut Warnings) -> Resu
     }
     let path = beside(source, Path::new(text));
     check_file(source, "scene.background", &path)?;
-    let picture = picture::read_file(&path)
+    let picture = crate::files::read(&path)
         .and_then(|bytes| picture::texture(&bytes, [Wrap::Clamp; 2]))
         .map_err(|what| SceneError::Model { file: path.clone(), what })?;
     if picture.texels.iter().any(|t| t[3] != 255) {

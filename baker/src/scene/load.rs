@@ -74,7 +74,7 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneError> {
         Some("glb" | "gltf" | "obj" | "ply") => alone(path, overrides),
         other => {
             // What is not there at all is told so first.
-            super::picture::read_file(path).map_err(|what| SceneError::Read { file: path.to_owned(), what })?;
+            crate::files::open_to_read(path).map_err(|what| SceneError::Read { file: path.to_owned(), what })?;
             let found = other.map_or_else(|| "nothing".to_owned(), |e| format!(".{e}"));
             Err(SceneError::Kind { file: path.to_owned(), found })
         }

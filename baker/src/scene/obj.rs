@@ -3,8 +3,9 @@
 
 use super::error::{SceneError, Warnings};
 use super::model::{MAX_TRIANGLES, Model, too_many};
-use super::picture::{self, read_file};
+use super::picture;
 use super::{Material, Texture, Triangle, Wrap};
+use crate::files::read as read_file;
 use glam::{DVec3, Vec2, Vec3};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};

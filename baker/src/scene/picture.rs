@@ -4,30 +4,11 @@
 use super::{Texture, Wrap};
 use image::{DynamicImage, ImageReader, Limits};
 use std::io::Cursor;
-use std::path::Path;
 
 /// No side of a picture may be longer, texels.
 pub(crate) const MAX_SIDE: u32 = 16_384;
 /// No decoded picture may take more memory, bytes.
 pub(crate) const MAX_BYTES: u64 = 512 << 20;
-/// No input file may be longer, bytes.
-const MAX_FILE: u64 = 2 << 30;
-
-/// The bytes of a file; errors say what is wrong with it (without its name).
-pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>, String> {
-    let meta = std::fs::metadata(path).map_err(|e| match e.kind() {
-        std::io::ErrorKind::NotFound => "no such file: check the path".to_owned(),
-        _ => format!("cannot be read ({e})"),
-    })?;
-    if meta.is_dir() {
-        return Err("is a directory; expected a file".to_owned());
-    }
-    if meta.len() > MAX_FILE {
-        return Err(format!("{} bytes; at most {MAX_FILE} are read", meta.len()));
-    }
-    std::fs::read(path).map_err(|e| format!("cannot be read ({e}): check its permissions"))
-}
-
 /// Decodes a PNG, JPEG or GIF (its first picture) within the size limits.
 pub(crate) fn decode(bytes: &[u8]) -> Result<DynamicImage, String> {
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;

@@ -3,8 +3,9 @@
 
 use super::error::SceneError;
 use super::model::{MAX_TRIANGLES, Model, too_many};
-use super::picture::{self, read_file};
+use super::picture;
 use super::{Material, Triangle, Wrap};
+use crate::files::read as read_file;
 use glam::{DVec3, Vec2, Vec3};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType};
@@ -129,7 +130,7 @@ fn check_count(e: &ElementDef, header: &Header, length: u64) -> Result<(), Strin
     // The last line of an ASCII file need not end.
     if (e.count as u64).saturating_mul(least) > length + 1 {
         return Err(format!(
-            "element {}: {} of them need at least {} bytes, but the file has {length}: it is cut short",
+            "element {}: {} of them need at least {} bytes, but the file has {length}: it is cut short: fetch or export it again",
             e.name,
             e.count,
             e.count as u64 * least
@@ -208,7 +209,9 @@ fn model(bytes: &[u8], folder: &Path, fallback: Option<&Path>) -> Result<Model, 
 }
 
 fn indices(corners: &[i64], count: usize) -> Result<Vec<usize>, String> {
-    let one = |c: &i64| usize::try_from(*c).ok().filter(|i| *i < count).ok_or_else(|| format!("index {c} of {count} vertices"));
+    let one = |c: &i64| {
+        usize::try_from(*c).ok().filter(|i| *i < count).ok_or_else(|| format!("index {c} of {count} vertices: export the file again"))
+    };
     corners.iter().map(one).collect()
 }
 

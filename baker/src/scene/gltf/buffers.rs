@@ -1,7 +1,7 @@
 //! The bytes a glTF file names: its binary chunk, data URIs, files beside it; never the network.
 //! The document comes from `document`; bytes go to `accessor` and to the textures.
 
-use crate::scene::picture::read_file;
+use crate::files::read as read_file;
 use ::gltf::json::Root;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -16,14 +16,17 @@ impl Buffers {
         for (i, buffer) in root.buffers.iter().enumerate() {
             let bytes = match &buffer.uri {
                 Some(uri) => fetch(uri, folder).map_err(|e| format!("buffer {i}: {e}"))?,
-                None if i == 0 => {
-                    blob.take().ok_or_else(|| format!("buffer {i}: no uri, and the file has no binary chunk: data are missing"))?
-                }
-                None => return Err(format!("buffer {i}: no uri: data are missing")),
+                None if i == 0 => blob
+                    .take()
+                    .ok_or_else(|| format!("buffer {i}: no uri, and the file has no binary chunk: data are missing: export it again"))?,
+                None => return Err(format!("buffer {i}: no uri: data are missing: export the file again")),
             };
             let expected = buffer.byte_length.0;
             if (bytes.len() as u64) < expected {
-                return Err(format!("buffer {i}: {} bytes; byteLength promises {expected}: the data are cut short", bytes.len()));
+                return Err(format!(
+                    "buffer {i}: {} bytes; byteLength promises {expected}: the data are cut short: fetch or export them again",
+                    bytes.len()
+                ));
             }
             all.push(bytes);
         }
@@ -136,7 +139,7 @@ fn decode_base64(text: &[u8]) -> Result<Vec<u8>, String> {
         }
     }
     if count == 6 {
-        return Err("data URI: the base64 text is cut short".to_owned());
+        return Err("data URI: the base64 text is cut short: fetch or export it again".to_owned());
     }
     Ok(out)
 }

@@ -66,35 +66,40 @@ pub(crate) fn parse(bytes: &[u8], warnings: &mut Warnings) -> Result<Shell, Stri
 fn split(bytes: &[u8]) -> Result<(&[u8], Option<Vec<u8>>), String> {
     let word = |at: usize| bytes.get(at..at + 4).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes);
     let (Some(version), Some(length)) = (word(4), word(8)) else {
-        return Err(format!("GLB header: {} bytes; expected 12: the file is cut short", bytes.len()));
+        return Err(format!("GLB header: {} bytes; expected 12: the file is cut short: fetch or export it again", bytes.len()));
     };
     if version != 2 {
         return Err(format!("GLB version {version}; expected 2: export as glTF 2.0"));
     }
     let length = length as usize;
     if length > bytes.len() {
-        return Err(format!("GLB header: length {length}, but the file has {} bytes: it is cut short", bytes.len()));
+        return Err(format!(
+            "GLB header: length {length}, but the file has {} bytes: it is cut short: fetch or export it again",
+            bytes.len()
+        ));
     }
     let (mut at, mut json, mut blob) = (12, None, None);
     while at < length {
         let (Some(size), Some(kind)) = (word(at), bytes.get(at + 4..at + 8)) else {
-            return Err(format!("GLB chunk at byte {at}: its header is cut short"));
+            return Err(format!("GLB chunk at byte {at}: its header is cut short: fetch or export it again"));
         };
         let name = String::from_utf8_lossy(kind).trim_end_matches('\0').to_owned();
         let Some(data) = bytes.get(at + 8..).and_then(|rest| rest.get(..size as usize)).filter(|_| at + 8 + size as usize <= length) else {
             let left = length.saturating_sub(at + 8);
-            return Err(format!("GLB chunk \"{name}\" at byte {at}: length {size}, but {left} bytes are left: the file is cut short"));
+            return Err(format!(
+                "GLB chunk \"{name}\" at byte {at}: length {size}, but {left} bytes are left: the file is cut short: fetch or export it again"
+            ));
         };
         match kind {
             b"JSON" if json.is_none() => json = Some(data),
-            _ if json.is_none() => return Err(format!("GLB: the first chunk is \"{name}\"; expected JSON")),
+            _ if json.is_none() => return Err(format!("GLB: the first chunk is \"{name}\"; expected JSON: export the file again")),
             b"BIN\0" if blob.is_none() => blob = Some(data.to_vec()),
             // The standard wants unknown chunks ignored.
             _ => {}
         }
         at += 8 + size as usize;
     }
-    json.map(|j| (j, blob)).ok_or_else(|| "GLB: no JSON chunk: the file is cut short".to_owned())
+    json.map(|j| (j, blob)).ok_or_else(|| "GLB: no JSON chunk: the file is cut short: fetch or export it again".to_owned())
 }
 
 fn check_version(value: &Value) -> Result<(), String> {

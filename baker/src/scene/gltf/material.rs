@@ -37,7 +37,7 @@ pub(crate) fn load(data: Data<'_>, folder: &Path, fallback: Option<&Path>, model
         if mappings.iter().any(Option::is_some) {
             model.warnings.add(format!("texture {} is not used: the model's materials name their own", path.display()));
         } else {
-            let texture = picture::read_file(path)
+            let texture = crate::files::read(path)
                 .and_then(|b| picture::texture(&b, [Wrap::Repeat; 2]))
                 .map_err(|e| format!("texture {}: {e}", path.display()))?;
             model.textures.push(texture);

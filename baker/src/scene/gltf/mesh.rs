@@ -164,7 +164,7 @@ fn read(
         Some(a) => {
             let n = data.read_indices(a.value()).map_err(|e| format!("indices: {e}"))?;
             if let Some(bad) = n.values.iter().find(|v| !(**v >= 0.0 && **v < count as f64)) {
-                return Err(format!("index {bad} of {count} vertices"));
+                return Err(format!("index {bad} of {count} vertices: export the file again"));
             }
             n.values.iter().map(|v| *v as u32).collect()
         }

@@ -12,7 +12,7 @@ mod nodes;
 
 use super::error::SceneError;
 use super::model::Model;
-use super::picture::read_file;
+use crate::files::read as read_file;
 use accessor::Data;
 use std::path::Path;
 

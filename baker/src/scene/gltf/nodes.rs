@@ -39,7 +39,10 @@ pub(crate) fn load(data: Data<'_>, warnings: &mut Warnings) -> Result<Nodes, Str
         for child in node.children.iter().flatten() {
             let slot = parents.get_mut(child.value()).ok_or_else(|| format!("{}: child {child} of {count} nodes", name(data, i)))?;
             if let Some(other) = slot.replace(i) {
-                return Err(format!("{} is a child of nodes {other} and {i}; expected a tree", name(data, child.value())));
+                return Err(format!(
+                    "{} is a child of nodes {other} and {i}; expected a tree: export the file again",
+                    name(data, child.value())
+                ));
             }
         }
     }
@@ -88,7 +91,7 @@ fn order(data: Data<'_>, parents: &[Option<usize>], warnings: &mut Warnings) -> 
     while let Some((i, depth)) = stack.pop() {
         let Some(flag) = seen.get_mut(i) else { return Err(format!("the scene names node {i} of {}", parents.len())) };
         if std::mem::replace(flag, true) {
-            return Err(format!("{} is reached twice, or is its own ancestor; expected a tree", name(data, i)));
+            return Err(format!("{} is reached twice, or is its own ancestor; expected a tree: export the file again", name(data, i)));
         }
         if depth > MAX_DEPTH {
             return Err(format!("{}: more than {MAX_DEPTH} ancestors: flatten the hierarchy", name(data, i)));

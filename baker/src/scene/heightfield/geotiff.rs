@@ -41,7 +41,7 @@ pub(crate) fn read(bytes: &[u8], warnings: &mut Warnings) -> Result<Grid, String
     let posts = width as usize * height as usize;
     let bands = values.len() / posts;
     if bands == 0 {
-        return Err(format!("{} values for {width} x {height} posts: the file is cut short", values.len()));
+        return Err(format!("{} values for {width} x {height} posts: the file is cut short: fetch or export it again", values.len()));
     }
     if bands > 1 {
         warnings.add(format!("the picture of heights has {bands} bands: the first is taken"));

@@ -86,7 +86,7 @@ fn centre(i: u32, n: u32, original: u32) -> f64 {
 
 /// Reads heights: TIFF of any number, grey PNG of 8 or 16 bits, or the brightness of another picture.
 pub(crate) fn load(path: &Path, warnings: &mut Warnings) -> Result<Grid, String> {
-    let bytes = picture::read_file(path)?;
+    let bytes = crate::files::read(path)?;
     let tiff = bytes.starts_with(b"II") || bytes.starts_with(b"MM");
     let grid = if tiff { geotiff::read(&bytes, warnings)? } else { from_picture(picture::decode(&bytes)?, warnings) };
     if grid.width < 2 || grid.height < 2 {

@@ -1,0 +1,89 @@
+//! The program from outside: what it refuses, with which exit code, and what it leaves behind.
+//! A triangle written here goes in through the built program; messages, exit codes and files are checked.
+
+use std::path::Path;
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n";
+
+/// A folder that holds `a.obj`.
+fn folder() -> TempDir {
+    let dir = tempfile::tempdir().unwrap();
+    std::fs::write(dir.path().join("a.obj"), TRIANGLE).unwrap();
+    dir
+}
+
+fn program(dir: &Path, arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_cubist-bake"));
+    command.current_dir(dir).args(arguments);
+    command
+}
+
+/// Bakes `scene` small.
+fn bake(dir: &Path, scene: &str, arguments: &[&str]) -> Output {
+    program(dir, &[scene, "--size", "16x12", "--frames", "2", "--truth", "none"]).args(arguments).output().unwrap()
+}
+
+fn names(dir: &Path) -> Vec<String> {
+    let mut names: Vec<_> = std::fs::read_dir(dir).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[track_caller]
+fn refused(output: &Output, code: i32, message: &str) {
+    let text = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{text}");
+    assert!(text.contains(message), "{text}");
+}
+
+#[test]
+fn the_scene_and_the_bundle_are_never_written_over() {
+    let dir = folder();
+    refused(&bake(dir.path(), "a.obj", &["-o", "./a.obj"]), 2, "that is the scene");
+    refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--report", "./a.cubist"]), 2, "that is the bundle");
+    refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--report", "a.obj"]), 2, "that is the scene");
+    assert_eq!(std::fs::read_to_string(dir.path().join("a.obj")).unwrap(), TRIANGLE);
+    assert_eq!(names(dir.path()), ["a.obj"]);
+}
+
+#[test]
+fn what_cannot_be_written_is_said_before_the_work() {
+    let dir = folder();
+    std::fs::write(dir.path().join("plain"), "x").unwrap();
+    refused(&bake(dir.path(), "a.obj", &["-o", "new/"]), 1, "expected a file's name");
+    refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--diagnostics", "plain"]), 1, "plain: the folder cannot be made");
+    refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--report", "plain/a.json"]), 1, "plain: the folder cannot be made");
+    assert_eq!(names(dir.path()), ["a.obj", "plain"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn devices_are_no_scenes_and_stay_devices() {
+    let dir = folder();
+    refused(&bake(dir.path(), "/dev/zero", &["-o", "a.cubist"]), 1, "load /dev/zero: is a device or a pipe");
+    refused(&program(dir.path(), &["inspect", "/dev/zero"]).output().unwrap(), 1, "/dev/zero: is a device or a pipe");
+    std::os::unix::fs::symlink("/dev/zero", dir.path().join("endless.glb")).unwrap();
+    refused(&bake(dir.path(), "endless.glb", &["-o", "a.cubist"]), 1, "is a device or a pipe");
+    if Path::new("/dev/full").exists() {
+        refused(&bake(dir.path(), "a.obj", &["-o", "/dev/full"]), 1, "/dev/full: writing failed: No space left");
+    }
+    assert_eq!(bake(dir.path(), "a.obj", &["-o", "/dev/null"]).status.code(), Some(0));
+    assert!(!std::fs::metadata("/dev/null").unwrap().is_file());
+    assert_eq!(names(dir.path()), ["a.obj", "endless.glb"]);
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_bake_leaves_nothing() {
+    let dir = folder();
+    let mut child = program(dir.path(), &["builtin:street", "-o", "new/a.cubist", "--frames", "2000"]).spawn().unwrap();
+    // The folder is made after the handler is set.
+    while !dir.path().join("new").exists() {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    assert!(names(&dir.path().join("new")).is_empty());
+}
