@@ -10,7 +10,7 @@ use crate::sheets::{self, KeyGrid, Layers};
 use crate::trace::Tracer;
 use crate::verify::VerifyError;
 use crate::{fields, fit, order, tears};
-use cubist_core::format::TIME_CUBIC;
+use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC};
 use std::time::Instant;
 use thiserror::Error;
 
@@ -74,6 +74,8 @@ pub struct Settings {
     pub key_interval: u32,
     /// How layers are interpolated between keys: one of the format's `TIME_` numbers.
     pub time: u8,
+    /// How layers are interpolated between nodes: one of the format's `SPACE_` numbers.
+    pub space: u8,
     /// The source image.
     pub atlas: atlas::Settings,
     /// The keys.
@@ -90,6 +92,7 @@ impl Default for Settings {
             cell: 8,
             key_interval: 8,
             time: TIME_CUBIC,
+            space: SPACE_CUBIC,
             atlas: atlas::Settings::default(),
             coding: CodingSettings { step_log2: 0, lambda: 0.05, independent_every: 16 },
             least_pixels: 8,
@@ -155,7 +158,8 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     }
     let start = Instant::now();
     let Atlas { image, gbuffer, .. } = &flat.atlas;
-    let grid = KeyGrid::new(gbuffer, settings.cell.trailing_zeros() as u8, settings.key_interval, scene.playback.looping, settings.time);
+    let cell_log2 = settings.cell.trailing_zeros() as u8;
+    let grid = KeyGrid::new(gbuffer, cell_log2, settings.key_interval, scene.playback.looping, [settings.time, settings.space]);
     // In small cells and short intervals a few pixels are much.
     let volume = settings.cell * settings.cell * settings.key_interval;
     let least = if volume < 512 { settings.least_pixels.min(volume / 64).max(1) } else { settings.least_pixels };

@@ -8,7 +8,7 @@ use crate::fit::{self, Problem};
 use crate::gbuffer::GBuffer;
 use crate::sheets::{KeyGrid, Layers, Sheets};
 use cubist_core::fixed::{field_code, field_distance};
-use cubist_core::format::TIME_LINEAR;
+use cubist_core::format::{SPACE_LINEAR, TIME_LINEAR};
 use rayon::prelude::*;
 
 /// Distances are told apart up to this many cells.
@@ -55,7 +55,7 @@ pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers
             Thin::Down => strip(distances[2], distances[3], inside, reach),
         }
     };
-    let fitted = fit::solve_for(&Problem { grid, sheets, layers, time: TIME_LINEAR, target });
+    let fitted = fit::solve_for(&Problem { grid, sheets, layers, time: TIME_LINEAR, space: SPACE_LINEAR, target });
     let stored = |distance: f32| field_distance(field_code(libm::roundf(distance * 256.0) as i32)) as f32 / 256.0;
     let strip = thin.iter().map(|&thin| thin != Thin::No).collect();
     Fields { distance: fitted.uv.iter().map(|pair| pair.map(stored)).collect(), strip }

@@ -5,7 +5,8 @@
 //! positions: those that continue the visible part of their sheet best.
 
 use crate::gbuffer::GBuffer;
-use crate::sheets::{Chain, KeyGrid, Layers, Sheets, bilinear};
+use crate::patch::{self, AtNodes, AtPoints, CORNERS, NODES, POINTS, Patch, Stencil};
+use crate::sheets::{KeyGrid, Layers, Sheets};
 use rayon::prelude::*;
 
 /// Weight of the second differences inside a cell, per pixel: keeps sheets that few pixels pin down flat.
@@ -14,18 +15,67 @@ const TWIST: f32 = 1e-4;
 const GRADIENT: f32 = 1e-7;
 /// Conjugate gradient steps. Cells are small and overlap: 50 steps settle below 1/64 texel, half a step of what is stored.
 const STEPS: usize = 60;
+/// Products are summed in this many runs of elements, whatever the number of threads.
+const RUNS: usize = 8;
 
-/// Unknowns of a sheet in a cell and interval: four corners times four keys.
-const UNKNOWNS: usize = 16;
+/// A layer that is not there.
+const NOWHERE: u32 = u32::MAX;
 
-/// The normal equations of one sheet in one cell and interval, for two quantities side by side.
+/// What one sheet in one cell and interval asks of its layers: the normal equations, in factors.
 struct Element {
-    /// The layer of corner c and key k at index 4 c + k; where there is none, one with weight zero.
-    layer: [u32; UNKNOWNS],
-    matrix: [[f32; UNKNOWNS]; UNKNOWNS],
-    right: [[f32; 2]; UNKNOWNS],
-    /// Sum of the weights and weighted targets of its pixels.
-    seen: [f64; 3],
+    /// The layers of every node's four keys, [`NOWHERE`] where there is none.
+    layer: [[u32; 4]; NODES],
+    /// For every node the set of weights its keys have in time.
+    set: [u8; NODES],
+    stencil: Stencil,
+    interval: u32,
+    /// Pixels of the cell and interval.
+    volume: f32,
+    pixels: Pixels,
+}
+
+/// The pixels that an element is fitted to.
+enum Pixels {
+    /// The same ones in every frame, and all nodes' keys weigh the same: the squares of the keys' weights, summed over the frames.
+    Same(Sums, [[f32; 4]; 4]),
+    /// Those of each frame.
+    Each(Vec<Sums>),
+}
+
+/// The products of the four points' weights, summed over pixels, for every quarter of a cell in one frame: the upper half of a symmetric
+/// matrix, row by row.
+#[derive(Clone, Copy, Default, PartialEq)]
+struct Sums([[f32; 10]; 4]);
+
+impl Sums {
+    fn add(&mut self, quarter: usize, weights: [f32; 4], weight: f32) {
+        let sums = &mut self.0[quarter];
+        let mut at = 0;
+        for a in 0..4 {
+            for b in a..4 {
+                sums[at] += weight * weights[a] * weights[b];
+                at += 1;
+            }
+        }
+    }
+
+    /// The product with the points' values.
+    fn times(&self, points: &AtPoints) -> AtPoints {
+        let mut out = [[0.0; 2]; POINTS];
+        for (quarter, m) in self.0.iter().enumerate() {
+            let first = quarter / 2 * 3 + quarter % 2;
+            let at = [first, first + 1, first + 3, first + 4];
+            let [a, b, c, d] = at.map(|point| points[point]);
+            for axis in 0..2 {
+                let (a, b, c, d) = (a[axis], b[axis], c[axis], d[axis]);
+                out[at[0]][axis] += m[0] * a + m[1] * b + m[2] * c + m[3] * d;
+                out[at[1]][axis] += m[1] * a + m[4] * b + m[5] * c + m[6] * d;
+                out[at[2]][axis] += m[2] * a + m[5] * b + m[7] * c + m[8] * d;
+                out[at[3]][axis] += m[3] * a + m[6] * b + m[8] * c + m[9] * d;
+            }
+        }
+        out
+    }
 }
 
 /// What one fit is about.
@@ -38,6 +88,8 @@ pub struct Problem<'a, T> {
     pub layers: &'a Layers,
     /// How layers are interpolated in time.
     pub time: u8,
+    /// How they are interpolated in space.
+    pub space: u8,
     /// The target and weight of a G-buffer pixel for the sheet at a place in the list of its cell (interval times cells plus cell);
     /// `None`: the sheet does not care.
     pub target: T,
@@ -52,21 +104,6 @@ pub struct Fit {
     pub weight: Vec<f32>,
 }
 
-/// The regulariser of a cell of `volume` pixels: squared differences of order one to three over its corners in space and time.
-fn regulariser(volume: f32, matrix: &mut [[f32; UNKNOWNS]; UNKNOWNS]) {
-    // Corner bits: across, down, in time; the interval's keys are the second and third of each chain.
-    let unknown = |corner: usize| (corner & 3) * 4 + 1 + (corner >> 2);
-    for difference in 1..8usize {
-        let weight = volume * if difference.count_ones() >= 2 { TWIST } else { GRADIENT } / 8.0;
-        let sign = |corner: usize| if (corner & difference).count_ones() % 2 == 1 { -1.0 } else { 1.0 };
-        for a in 0..8 {
-            for b in 0..8 {
-                matrix[unknown(a)][unknown(b)] += weight * sign(a) * sign(b);
-            }
-        }
-    }
-}
-
 /// Fits the positions of all layers.
 #[must_use]
 pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers) -> Fit {
@@ -74,7 +111,7 @@ pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers
         let own = gbuffer.label[pixel] == u16::from(sheets.lists[index][sheet]);
         own.then(|| (gbuffer.uv[pixel], 1.0))
     };
-    solve_for(&Problem { grid, sheets, layers, time: grid.time, target })
+    solve_for(&Problem { grid, sheets, layers, time: grid.time, space: grid.space, target })
 }
 
 /// Fits two quantities of all layers to the targets of `problem`.
@@ -83,135 +120,290 @@ pub fn solve_for<T>(problem: &Problem<'_, T>) -> Fit
 where
     T: Fn(usize, usize, usize) -> Option<([f32; 2], f32)> + Sync,
 {
-    let elements = assemble(problem);
-    let start = initial(&elements, problem.layers.label.len());
-    conjugate_gradients(&elements, start)
+    let System { elements, right, diagonal, start } = assemble(problem);
+    let weights = Weights::new(problem);
+    let uv = conjugate_gradients(&|x, y| multiply(&elements, &weights, x, y), &right, &diagonal, start);
+    Fit { uv: uv.iter().map(|uv| uv.map(|x| x as f32)).collect(), weight: diagonal.iter().map(|&d| d as f32).collect() }
 }
 
-fn assemble<T>(problem: &Problem<'_, T>) -> Vec<Element>
+/// The weights of the keys at every frame.
+struct Weights(Vec<Vec<[[f32; 4]; 4]>>);
+
+impl Weights {
+    fn new<T>(problem: &Problem<'_, T>) -> Self {
+        let grid = problem.grid;
+        let of = |interval| grid.frames_of(interval).map(|frame| grid.weights(interval, frame, problem.time)).collect();
+        Self((0..grid.intervals()).map(of).collect())
+    }
+}
+
+/// What is to be solved.
+struct System {
+    elements: Vec<Element>,
+    right: Vec<[f64; 2]>,
+    diagonal: Vec<f64>,
+    /// Every layer at the mean of its sheets' targets, to start from.
+    start: Vec<[f64; 2]>,
+}
+
+/// An element with its right-hand side.
+struct Assembled {
+    element: Element,
+    right: [[[f32; 2]; 4]; NODES],
+    diagonal: [[f32; 4]; NODES],
+    /// Sum of the weights and weighted targets of its pixels.
+    seen: [f64; 3],
+}
+
+fn assemble<T>(problem: &Problem<'_, T>) -> System
+where
+    T: Fn(usize, usize, usize) -> Option<([f32; 2], f32)> + Sync,
+{
+    let cells = problem.grid.grid.cells();
+    let layers = problem.layers.label.len();
+    let mut system = System { elements: Vec::new(), right: vec![[0.0; 2]; layers], diagonal: vec![1e-9; layers], start: Vec::new() };
+    let mut means = vec![[0.0f64; 3]; layers];
+    // An interval at a time: right-hand sides are large.
+    for lists in (0..problem.sheets.lists.len()).step_by(cells) {
+        let assembled: Vec<Vec<Assembled>> =
+            (lists..lists + cells).into_par_iter().map(|index| assemble_cell(problem, index)).collect();
+        for Assembled { element, right, diagonal, seen } in assembled.into_iter().flatten() {
+            for (layers, (right, diagonal)) in element.layer.iter().zip(right.iter().zip(&diagonal)) {
+                for (&layer, (right, diagonal)) in layers.iter().zip(right.iter().zip(diagonal)).filter(|&(&layer, _)| layer != NOWHERE) {
+                    let layer = layer as usize;
+                    system.diagonal[layer] += f64::from(*diagonal);
+                    system.right[layer][0] += f64::from(right[0]);
+                    system.right[layer][1] += f64::from(right[1]);
+                }
+            }
+            for &layer in CORNERS.iter().flat_map(|&node| &element.layer[node]).filter(|&&layer| layer != NOWHERE) {
+                for (sum, seen) in means[layer as usize].iter_mut().zip(seen) {
+                    *sum += seen;
+                }
+            }
+            system.elements.push(element);
+        }
+    }
+    system.start = means.iter().map(|[u, v, n]| [u / n.max(1e-9), v / n.max(1e-9)]).collect();
+    system
+}
+
+/// The elements of all sheets of one cell and interval.
+fn assemble_cell<T>(problem: &Problem<'_, T>, index: usize) -> Vec<Assembled>
 where
     T: Fn(usize, usize, usize) -> Option<([f32; 2], f32)> + Sync,
 {
     let grid = problem.grid;
-    let cells = grid.grid.cells();
-    let per_cell: Vec<Vec<Element>> = problem
-        .sheets
-        .lists
-        .par_iter()
-        .enumerate()
-        .map(|(index, list)| {
-            let (interval, cell) = (index / cells, index % cells);
-            let [columns, rows] = grid.pixels(cell);
-            let volume = (columns.len() * rows.len() * grid.frames_of(interval).len()) as f32;
-            let chains: Vec<[Chain; 4]> =
-                list.iter().map(|&label| problem.layers.chains(grid, interval, cell, label, problem.time)).collect();
-            let mut elements: Vec<Element> = chains.iter().map(|chains| Element::new(chains, volume)).collect();
-            for frame in grid.frames_of(interval) {
-                let weights = grid.weights(interval, frame, problem.time);
-                // Within a frame only the corners' weights change from pixel to pixel: the keys' come in once.
-                let mut sums = vec![FrameSums::default(); list.len()];
-                grid.each_pixel(frame, cell, |pixel, at| {
-                    let corner = bilinear(at);
-                    for (sheet, sums) in sums.iter_mut().enumerate() {
-                        if let Some((target, weight)) = (problem.target)(index, sheet, pixel) {
-                            sums.add(corner, target, weight);
-                        }
-                    }
-                });
-                for ((element, sums), chains) in elements.iter_mut().zip(&sums).zip(&chains) {
-                    element.add(sums, &chains.map(|chain| chain.weights(&weights)));
-                }
-            }
-            elements
-        })
+    let place = [index / grid.grid.cells(), index % grid.grid.cells()];
+    let list = &problem.sheets.lists[index];
+    let [columns, rows] = grid.pixels(place[1]);
+    let frames = grid.frames_of(place[0]);
+    let volume = (columns.len() * rows.len() * frames.len()) as f32;
+    let mut assembled: Vec<Assembled> = list
+        .iter()
+        .map(|&label| Assembled::new(&Patch::new(grid, problem.layers, place, label, [problem.time, problem.space]), place[0], volume))
         .collect();
-    per_cell.into_iter().flatten().collect()
-}
-
-/// Sums over the pixels that a sheet shows in one frame of a cell, by corners.
-#[derive(Clone, Copy, Default)]
-struct FrameSums {
-    matrix: [[f32; 4]; 4],
-    right: [[f32; 2]; 4],
-    seen: [f32; 3],
-}
-
-impl FrameSums {
-    fn add(&mut self, corner: [f32; 4], [u, v]: [f32; 2], weight: f32) {
-        for (a, (row, right)) in self.matrix.iter_mut().zip(&mut self.right).enumerate() {
-            let scaled = weight * corner[a];
-            for (entry, b) in row.iter_mut().zip(corner) {
-                *entry += scaled * b;
+    let mut sums = vec![Vec::with_capacity(frames.len()); list.len()];
+    for frame in frames {
+        let mut frame_sums = vec![(Sums::default(), [[0.0f32; 2]; POINTS], [0.0f32; 3]); list.len()];
+        grid.each_pixel(frame, place[1], |pixel, at| {
+            let (points, weights) = patch::around(at);
+            for (sheet, (sums, right, seen)) in frame_sums.iter_mut().enumerate() {
+                let Some(([u, v], weight)) = (problem.target)(index, sheet, pixel) else { continue };
+                sums.add(points[0] / 3 * 2 + points[0] % 3, weights, weight);
+                for (point, share) in points.into_iter().zip(weights) {
+                    right[point][0] += weight * share * u;
+                    right[point][1] += weight * share * v;
+                }
+                *seen = [seen[0] + weight * u, seen[1] + weight * v, seen[2] + weight];
             }
-            right[0] += scaled * u;
-            right[1] += scaled * v;
+        });
+        let weights = grid.weights(place[0], frame, problem.time);
+        for (sheet, (frame_sums, right, seen)) in frame_sums.into_iter().enumerate() {
+            assembled[sheet].add(&frame_sums, &right, seen, &weights);
+            sums[sheet].push(frame_sums);
         }
-        self.seen = [self.seen[0] + weight * u, self.seen[1] + weight * v, self.seen[2] + weight];
     }
+    for (assembled, sums) in assembled.iter_mut().zip(sums) {
+        assembled.finish(sums, problem);
+    }
+    assembled
 }
 
-impl Element {
-    fn new(chains: &[Chain; 4], volume: f32) -> Self {
-        let mut layer = [u32::MAX; UNKNOWNS];
-        for (corner, chain) in chains.iter().enumerate() {
-            // The sheet lists made the layers: the inner two are there.
-            let some = chain.layer[1].or(chain.layer[2]).unwrap_or(0);
-            for (key, index) in chain.layer.iter().enumerate() {
-                layer[corner * 4 + key] = index.unwrap_or(some) as u32;
+impl Assembled {
+    fn new(patch: &Patch, interval: usize, volume: f32) -> Self {
+        let layer = patch.chains.map(|chain| chain.map_or([NOWHERE; 4], |chain| chain.layer.map(|at| at.map_or(NOWHERE, |at| at as u32))));
+        let set = patch.chains.map(|chain| chain.map_or(0, |chain| chain.set() as u8));
+        let pixels = Pixels::Each(Vec::new());
+        let element = Element { layer, set, stencil: patch.stencil, interval: interval as u32, volume, pixels };
+        let mut assembled = Self { element, right: [[[0.0; 2]; 4]; NODES], diagonal: [[0.0; 4]; NODES], seen: [0.0; 3] };
+        for node in CORNERS {
+            for key in [1, 2] {
+                assembled.diagonal[node][key] += regulariser_diagonal(volume);
             }
         }
-        let mut matrix = [[0.0; UNKNOWNS]; UNKNOWNS];
-        regulariser(volume, &mut matrix);
-        Self { layer, matrix, right: [[0.0; 2]; UNKNOWNS], seen: [0.0; 3] }
+        assembled
     }
 
-    fn add(&mut self, sums: &FrameSums, keys: &[[f32; 4]; 4]) {
-        if sums.seen[2] == 0.0 {
+    fn add(&mut self, sums: &Sums, right: &AtPoints, seen: [f32; 3], weights: &[[f32; 4]; 4]) {
+        if seen[2] == 0.0 {
             return;
         }
-        for (a, (row, right)) in self.matrix.iter_mut().zip(&mut self.right).enumerate() {
-            let weight = keys[a / 4][a % 4];
-            if weight == 0.0 {
+        let stencil = &self.element.stencil;
+        let at_nodes = stencil.transposed(right);
+        for node in 0..NODES {
+            if self.element.layer[node][1] == NOWHERE {
                 continue;
             }
-            for (b, entry) in row.iter_mut().enumerate() {
-                *entry += weight * keys[b / 4][b % 4] * sums.matrix[a / 4][b / 4];
+            // The diagonal of the points' matrix, seen from the node.
+            let mut one = [[0.0; 2]; NODES];
+            one[node] = [1.0, 0.0];
+            let points = stencil.points(&one);
+            let product = sums.times(&points);
+            let square: f32 = points.iter().zip(&product).map(|(a, b)| a[0] * b[0]).sum();
+            for (key, weight) in weights[usize::from(self.element.set[node])].into_iter().enumerate() {
+                self.diagonal[node][key] += weight * weight * square;
+                self.right[node][key][0] += weight * at_nodes[node][0];
+                self.right[node][key][1] += weight * at_nodes[node][1];
             }
-            right[0] += weight * sums.right[a / 4][0];
-            right[1] += weight * sums.right[a / 4][1];
         }
-        for (sum, seen) in self.seen.iter_mut().zip(sums.seen) {
+        for (sum, seen) in self.seen.iter_mut().zip(seen) {
             *sum += f64::from(seen);
         }
     }
+
+    /// Keeps what the products need, in the smallest form.
+    fn finish<T>(&mut self, sums: Vec<Sums>, problem: &Problem<'_, T>) {
+        let element = &mut self.element;
+        let mut sets = element.set.iter().zip(&element.layer).filter(|(_, layer)| layer[1] != NOWHERE).map(|(&set, _)| set);
+        let first = sets.next().unwrap_or(0);
+        if sets.all(|set| set == first) && sums.iter().all(|other| *other == sums[0]) {
+            let interval = element.interval as usize;
+            let mut squares = [[0.0; 4]; 4];
+            for frame in problem.grid.frames_of(interval) {
+                let weights = problem.grid.weights(interval, frame, problem.time)[usize::from(first)];
+                for (row, a) in squares.iter_mut().zip(weights) {
+                    for (entry, b) in row.iter_mut().zip(weights) {
+                        *entry += a * b;
+                    }
+                }
+            }
+            element.pixels = Pixels::Same(sums[0], squares);
+        } else {
+            element.pixels = Pixels::Each(sums);
+        }
+    }
 }
 
-/// Every layer at the mean of its sheets' targets, to start from.
-fn initial(elements: &[Element], layers: usize) -> Vec<[f64; 2]> {
-    let mut sums = vec![[0.0f64; 3]; layers];
-    for element in elements {
-        for &layer in &element.layer {
-            for (sum, seen) in sums[layer as usize].iter_mut().zip(element.seen) {
-                *sum += seen;
+/// The diagonal of the regulariser.
+fn regulariser_diagonal(volume: f32) -> f32 {
+    let weight = |difference: usize| if difference.count_ones() >= 2 { TWIST } else { GRADIENT };
+    (1..8).map(|difference| volume * weight(difference) / 8.0).sum()
+}
+
+/// The product of the regulariser with the values at a cell's corners at both ends of the interval (bits: across, down, in time):
+/// squared differences of order one to three.
+fn regularised(volume: f32, values: &[[f32; 2]; 8]) -> [[f32; 2]; 8] {
+    // The Walsh-Hadamard transform takes all differences at once, and back.
+    let transform = |mut values: [[f32; 2]; 8]| {
+        for bit in [1, 2, 4] {
+            for low in (0..8).filter(|at| at & bit == 0) {
+                for axis in 0..2 {
+                    let (a, b) = (values[low][axis], values[low | bit][axis]);
+                    (values[low][axis], values[low | bit][axis]) = (a + b, a - b);
+                }
+            }
+        }
+        values
+    };
+    let mut differences = transform(*values);
+    for (difference, value) in differences.iter_mut().enumerate() {
+        let weight = match difference.count_ones() {
+            0 => 0.0,
+            1 => GRADIENT,
+            _ => TWIST,
+        };
+        *value = value.map(|x| x * volume * weight / 8.0);
+    }
+    transform(differences)
+}
+
+impl Element {
+    /// Adds the element's share of the product A x to `y`.
+    fn multiply(&self, weights: &[[[f32; 4]; 4]], x: &[[f64; 2]], y: &mut [[f64; 2]]) {
+        let value = |layer: u32| if layer == NOWHERE { [0.0; 2] } else { x[layer as usize].map(|x| x as f32) };
+        let at = self.layer.map(|layers| layers.map(value));
+        let mut out = [[[0.0f32; 2]; 4]; NODES];
+        match &self.pixels {
+            Pixels::Same(sums, squares) => {
+                let products: [AtPoints; 4] = std::array::from_fn(|key| {
+                    let nodes: AtNodes = std::array::from_fn(|node| at[node][key]);
+                    sums.times(&self.stencil.points(&nodes))
+                });
+                for key in 0..4 {
+                    let mut mixed = [[0.0; 2]; POINTS];
+                    for (product, weight) in products.iter().zip(squares[key]) {
+                        for (sum, value) in mixed.iter_mut().zip(product) {
+                            sum[0] += weight * value[0];
+                            sum[1] += weight * value[1];
+                        }
+                    }
+                    for (out, value) in out.iter_mut().zip(self.stencil.transposed(&mixed)) {
+                        out[key] = value;
+                    }
+                }
+            }
+            Pixels::Each(frames) => {
+                for (sums, weights) in frames.iter().zip(weights) {
+                    let nodes: AtNodes = std::array::from_fn(|node| {
+                        let [a, b, c, d] = weights[usize::from(self.set[node])];
+                        let at = &at[node];
+                        [0, 1].map(|axis| a * at[0][axis] + b * at[1][axis] + c * at[2][axis] + d * at[3][axis])
+                    });
+                    let back = self.stencil.transposed(&sums.times(&self.stencil.points(&nodes)));
+                    for (node, value) in back.iter().enumerate() {
+                        for (out, weight) in out[node].iter_mut().zip(weights[usize::from(self.set[node])]) {
+                            out[0] += weight * value[0];
+                            out[1] += weight * value[1];
+                        }
+                    }
+                }
+            }
+        }
+        let corner = |bits: usize| (CORNERS[bits & 3], 1 + (bits >> 2));
+        let held = regularised(self.volume, &std::array::from_fn(|bits| at[corner(bits).0][corner(bits).1]));
+        for (bits, value) in held.iter().enumerate() {
+            let (node, key) = corner(bits);
+            out[node][key][0] += value[0];
+            out[node][key][1] += value[1];
+        }
+        for (layers, out) in self.layer.iter().zip(&out) {
+            for (&layer, out) in layers.iter().zip(out).filter(|&(&layer, _)| layer != NOWHERE) {
+                y[layer as usize][0] += f64::from(out[0]);
+                y[layer as usize][1] += f64::from(out[1]);
             }
         }
     }
-    sums.iter().map(|[u, v, n]| [u / n.max(1e-9), v / n.max(1e-9)]).collect()
 }
 
-/// y = A x, element by element in a fixed order: the same sums on any number of threads.
-fn multiply(elements: &[Element], x: &[[f64; 2]], y: &mut [[f64; 2]]) {
-    y.fill([0.0; 2]);
-    for element in elements {
-        let at = element.layer.map(|layer| x[layer as usize]);
-        for (row, &layer) in element.matrix.iter().zip(&element.layer) {
-            let mut sum = [0.0; 2];
-            for (&entry, value) in row.iter().zip(&at) {
-                sum[0] += f64::from(entry) * value[0];
-                sum[1] += f64::from(entry) * value[1];
+/// y = A x: runs of elements side by side, each in a fixed order, added up in a fixed order: the same sums on any number of threads.
+fn multiply(elements: &[Element], weights: &Weights, x: &[[f64; 2]], y: &mut [[f64; 2]]) {
+    let run = elements.len().div_ceil(RUNS).max(1);
+    let partial: Vec<Vec<[f64; 2]>> = elements
+        .par_chunks(run)
+        .map(|elements| {
+            let mut y = vec![[0.0; 2]; x.len()];
+            for element in elements {
+                element.multiply(&weights.0[element.interval as usize], x, &mut y);
             }
-            y[layer as usize][0] += sum[0];
-            y[layer as usize][1] += sum[1];
+            y
+        })
+        .collect();
+    y.fill([0.0; 2]);
+    for partial in partial {
+        for (y, partial) in y.iter_mut().zip(partial) {
+            y[0] += partial[0];
+            y[1] += partial[1];
         }
     }
 }
@@ -221,28 +413,23 @@ fn dot(a: &[[f64; 2]], b: &[[f64; 2]]) -> [f64; 2] {
 }
 
 /// Conjugate gradients with a diagonal preconditioner, u and v side by side.
-fn conjugate_gradients(elements: &[Element], start: Vec<[f64; 2]>) -> Fit {
-    let layers = start.len();
-    let mut diagonal = vec![1e-9f64; layers];
-    let mut right = vec![[0.0f64; 2]; layers];
-    for element in elements {
-        for (corner, &layer) in element.layer.iter().enumerate() {
-            diagonal[layer as usize] += f64::from(element.matrix[corner][corner]);
-            right[layer as usize][0] += f64::from(element.right[corner][0]);
-            right[layer as usize][1] += f64::from(element.right[corner][1]);
-        }
-    }
-    let scaled = |r: &[[f64; 2]]| -> Vec<[f64; 2]> { r.iter().zip(&diagonal).map(|(r, d)| [r[0] / d, r[1] / d]).collect() };
+fn conjugate_gradients(
+    multiply: &dyn Fn(&[[f64; 2]], &mut [[f64; 2]]),
+    right: &[[f64; 2]],
+    diagonal: &[f64],
+    start: Vec<[f64; 2]>,
+) -> Vec<[f64; 2]> {
+    let scaled = |r: &[[f64; 2]]| -> Vec<[f64; 2]> { r.iter().zip(diagonal).map(|(r, d)| [r[0] / d, r[1] / d]).collect() };
     let mut x = start;
-    let mut product = vec![[0.0; 2]; layers];
-    multiply(elements, &x, &mut product);
+    let mut product = vec![[0.0; 2]; x.len()];
+    multiply(&x, &mut product);
     let mut residual: Vec<[f64; 2]> = right.iter().zip(&product).map(|(b, a)| [b[0] - a[0], b[1] - a[1]]).collect();
     let mut z = scaled(&residual);
     let mut direction = z.clone();
     let mut rz = dot(&residual, &z);
     let ratio = |a: f64, b: f64| if b.abs() > 1e-30 { a / b } else { 0.0 };
     for _ in 0..STEPS {
-        multiply(elements, &direction, &mut product);
+        multiply(&direction, &mut product);
         let curvature = dot(&direction, &product);
         let step = [ratio(rz[0], curvature[0]), ratio(rz[1], curvature[1])];
         for ((x, r), (d, p)) in x.iter_mut().zip(&mut residual).zip(direction.iter().zip(&product)) {
@@ -259,5 +446,5 @@ fn conjugate_gradients(elements: &[Element], start: Vec<[f64; 2]>) -> Fit {
             *d = [z[0] + keep[0] * d[0], z[1] + keep[1] * d[1]];
         }
     }
-    Fit { uv: x.iter().map(|uv| [uv[0] as f32, uv[1] as f32]).collect(), weight: diagonal.iter().map(|&d| d as f32).collect() }
+    x
 }

@@ -231,7 +231,7 @@ impl Block {
 mod tests {
     use super::*;
     use crate::sheets;
-    use cubist_core::format::TIME_LINEAR;
+    use cubist_core::format::{SPACE_LINEAR, TIME_LINEAR};
 
     /// One label everywhere, torn where `tear` says, in cells of 2^`cell_log2` pixels and one interval; folded and looked through.
     fn folded(size: [u32; 2], frames: u32, cell_log2: u8, tear: impl Fn(usize) -> u8) -> (Folded, sheets::Sheets) {
@@ -239,7 +239,7 @@ mod tests {
         let uv = vec![[8.0f32; 2]; pixels];
         let gbuffer = GBuffer { width: size[0], height: size[1], frames, label: vec![1; pixels], uv: uv.into() };
         let labels = vec![Label { rect: [0, 0, 16, 16], masked: false, fixed: None }; 2];
-        let grid = KeyGrid::new(&gbuffer, cell_log2, frames, true, TIME_LINEAR);
+        let grid = KeyGrid::new(&gbuffer, cell_log2, frames, true, [TIME_LINEAR, SPACE_LINEAR]);
         let tears: Vec<u8> = (0..pixels).map(tear).collect();
         let folded = unfold(&gbuffer, &tears, &grid, &labels, 16);
         let sheets = sheets::find(&folded.gbuffer, &grid, 8);

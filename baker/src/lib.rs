@@ -17,6 +17,7 @@ pub mod inspect;
 pub mod job;
 pub mod metrics;
 pub mod order;
+pub mod patch;
 pub mod report;
 pub mod scene;
 pub mod shade;

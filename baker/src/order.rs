@@ -6,8 +6,9 @@ use crate::atlas::SourceImage;
 use crate::fields::Fields;
 use crate::fit::Fit;
 use crate::gbuffer::GBuffer;
-use crate::sheets::{Chain, KeyGrid, Layers, Sheets, bilinear};
-use cubist_core::format::{MAX_SHEETS, TIME_LINEAR};
+use crate::patch::{self, AtPoints, Patch};
+use crate::sheets::{KeyGrid, Layers, Sheets};
+use cubist_core::format::{MAX_SHEETS, SPACE_LINEAR, TIME_LINEAR};
 use cubist_core::lists::{BOTH, CHART, FIELD};
 use rayon::prelude::*;
 
@@ -89,22 +90,22 @@ fn observe(evidence: &Evidence<'_>, index: usize, list: &[u8]) -> Vec<Group> {
     let &Evidence { gbuffer, grid, image, layers, fit, fields, .. } = evidence;
     let cells = grid.grid.cells();
     let (interval, cell) = (index / cells, index % cells);
-    let chains = |time| -> Vec<[Chain; 4]> { list.iter().map(|&label| layers.chains(grid, interval, cell, label, time)).collect() };
-    let (position_chains, field_chains) = (chains(grid.time), chains(TIME_LINEAR));
+    let patches =
+        |ways| -> Vec<Patch> { list.iter().map(|&label| Patch::new(grid, layers, [interval, cell], label, ways)).collect() };
+    let (position_patches, field_patches) = (patches([grid.time, grid.space]), patches([TIME_LINEAR, SPACE_LINEAR]));
     let mut seen: Vec<u64> = Vec::new();
     for frame in grid.frames_of(interval) {
         let weights = grid.weights(interval, frame, grid.time);
         let linear = grid.weights(interval, frame, TIME_LINEAR);
-        let at_corners = |chains: &[[Chain; 4]], values: &[[f32; 2]], weights: &[[f32; 4]; 4]| -> Vec<[[f32; 2]; 4]> {
-            chains.iter().map(|chains| chains.map(|chain| chain.value(values, weights))).collect()
+        let points = |patches: &[Patch], values: &[[f32; 2]], weights: &[[f32; 4]; 4]| -> Vec<AtPoints> {
+            patches.iter().map(|patch| patch.points(values, weights)).collect()
         };
-        let positions = at_corners(&position_chains, &fit.uv, &weights);
-        let distances = fields.map(|fields| at_corners(&field_chains, &fields.distance, &linear));
+        let positions = points(&position_patches, &fit.uv, &weights);
+        let distances = fields.map(|fields| points(&field_patches, &fields.distance, &linear));
         grid.each_pixel(frame, cell, |pixel, at| {
             let Some(sheet) = list.iter().position(|&label| u16::from(label) == gbuffer.label[pixel]) else { return };
-            let corner = bilinear(at);
-            let mix =
-                |values: &[[f32; 2]; 4]| [0, 1].map(|axis| values.iter().zip(corner).map(|(value, weight)| value[axis] * weight).sum());
+            let around = patch::around(at);
+            let mix = |points: &AtPoints| patch::value(points, around);
             let mut covering = 0u32;
             for (place, &label) in list.iter().enumerate() {
                 covering |= u32::from(covers(image, label, mix(&positions[place]))) << place;

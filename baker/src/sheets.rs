@@ -22,12 +22,14 @@ pub struct KeyGrid {
     pub looping: bool,
     /// How layers are interpolated between keys: one of the format's `TIME_` numbers.
     pub time: u8,
+    /// How they are interpolated between nodes: one of the format's `SPACE_` numbers.
+    pub space: u8,
 }
 
 impl KeyGrid {
     /// Cells of 2^`cell_log2` pixels, keys every `interval` frames; without a loop the last key stands at the last frame.
     #[must_use]
-    pub fn new(gbuffer: &GBuffer, cell_log2: u8, interval: u32, looping: bool, time: u8) -> Self {
+    pub fn new(gbuffer: &GBuffer, cell_log2: u8, interval: u32, looping: bool, [time, space]: [u8; 2]) -> Self {
         let last = gbuffer.frames.saturating_sub(1);
         let mut keys: Vec<u32> = (0..gbuffer.frames).step_by(interval.max(1) as usize).collect();
         if !looping && keys.last() != Some(&last) {
@@ -39,7 +41,7 @@ impl KeyGrid {
         }
         let size = [gbuffer.width as usize, gbuffer.height as usize];
         let grid = Grid::new(gbuffer.width as u16, gbuffer.height as u16, cell_log2);
-        Self { grid, size, keys, frames: gbuffer.frames, looping, time }
+        Self { grid, size, keys, frames: gbuffer.frames, looping, time, space }
     }
 
     /// Key intervals: between each two keys, on a looping path also back to the first; a single key has one.
@@ -220,17 +222,9 @@ impl Layers {
         let (from, to) = (self.start[key_node] as usize, self.start[key_node + 1] as usize);
         self.label[from..to].binary_search(&label).ok().map(|at| from + at)
     }
-
-    /// The chains of a sheet: for each corner of its cell its layers in the keys around the interval.
-    #[must_use]
-    pub fn chains(&self, grid: &KeyGrid, interval: usize, cell: usize, label: u8, time: u8) -> [Chain; 4] {
-        let nodes = grid.grid.nodes();
-        let keys = grid.keys_around(interval, time);
-        grid.corners(cell).map(|node| Chain { layer: keys.map(|key| key.and_then(|key| self.find(key * nodes + node, label))) })
-    }
 }
 
-/// One corner of a sheet over time: its layers in the keys before the interval, at its two ends and after it.
+/// One node of a sheet over time: its layers in the keys before the interval, at its two ends and after it.
 #[derive(Clone, Copy, Debug)]
 pub struct Chain {
     /// Indices of layers; the inner two are always there.
@@ -238,10 +232,16 @@ pub struct Chain {
 }
 
 impl Chain {
+    /// Which of the sets of weights that [`KeyGrid::weights`] gives is the chain's.
+    #[must_use]
+    pub fn set(&self) -> usize {
+        usize::from(self.layer[0].is_none()) | usize::from(self.layer[3].is_none()) << 1
+    }
+
     /// The weights of the chain's layers, out of those that [`KeyGrid::weights`] gives.
     #[must_use]
     pub fn weights(&self, set: &[[f32; 4]; 4]) -> [f32; 4] {
-        set[usize::from(self.layer[0].is_none()) | usize::from(self.layer[3].is_none()) << 1]
+        set[self.set()]
     }
 
     /// The chain's value, given its layers' `values` and the weights.

@@ -5,7 +5,7 @@ use crate::BundleError;
 use crate::atlas::Texture;
 use crate::format::{
     self, ATLAS, Atlas, Envelope, FIXED, INFO, KEY_BYTES, KNOWN_FLAGS, KeyEntry, LABEL_BYTES, LABELS, LabelRecord, MAGIC, MASK, MASKED,
-    MAX_SECTIONS, MAX_SHEETS, PATH, Path, Section, TIME_CUBIC, VERSION,
+    MAX_SECTIONS, MAX_SHEETS, PATH, Path, Section, SPACE_CUBIC, TIME_CUBIC, VERSION,
 };
 use crate::grid::Grid;
 use heapless::Vec;
@@ -215,6 +215,7 @@ fn check_path<'a>(path: &Path<'a>) -> Result<&'a [[u8; KEY_BYTES]], BundleError>
     field(path.fps > 0, "PATH fps", u32::from(path.fps))?;
     field((2..=5).contains(&path.cell_log2), "PATH cell_log2", u32::from(path.cell_log2))?;
     field(path.time <= TIME_CUBIC, "PATH time", u32::from(path.time))?;
+    field(path.space <= SPACE_CUBIC, "PATH space", u32::from(path.space))?;
     field(path.step_log2 <= 4, "PATH step_log2", u32::from(path.step_log2))?;
     field((1..=MAX_SHEETS as u8).contains(&path.limits.cell_sheets), "PATH cell_sheets", u32::from(path.limits.cell_sheets))?;
     field(path.limits.fields <= 2, "PATH fields", u32::from(path.limits.fields))?;

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// What a bundle starts with.
 pub const MAGIC: [u8; 6] = *b"CUBIST";
 /// The format's version.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;
 /// The most sections a bundle can hold.
 pub const MAX_SECTIONS: usize = 16;
 /// The most sheets a cell can hold: the tests of all but the last fit into 16 bits.
@@ -143,6 +143,11 @@ pub const TIME_LINEAR: u8 = 1;
 /// Catmull-Rom curves through four keys, straight at a layer's first and last.
 pub const TIME_CUBIC: u8 = 2;
 
+/// How layers are interpolated between nodes: [`Path::space`].
+pub const SPACE_LINEAR: u8 = 0;
+/// Every cell is halved both ways, its middles told from four nodes in a row; straight lines between them.
+pub const SPACE_CUBIC: u8 = 1;
+
 /// How many keys before an interval's first and after its first one are needed to play it.
 #[must_use]
 pub const fn reach(time: u8) -> (usize, usize) {
@@ -166,6 +171,8 @@ pub struct Path<'a> {
     pub cell_log2: u8,
     /// [`TIME_HOLD`], [`TIME_LINEAR`] or [`TIME_CUBIC`].
     pub time: u8,
+    /// [`SPACE_LINEAR`] or [`SPACE_CUBIC`].
+    pub space: u8,
     /// Coordinates are coded in steps of 2^this / 32 texel, 0..=4.
     pub step_log2: u8,
     /// The bounds that memory and work follow from.

@@ -83,7 +83,6 @@
 
 mod atlas;
 mod bundle;
-mod cell;
 pub mod coder;
 mod coverage;
 mod error;
@@ -99,6 +98,8 @@ pub mod nodes;
 mod player;
 mod predict;
 pub mod record;
+mod row;
+mod sheet;
 mod span;
 pub mod timeline;
 

@@ -2,12 +2,13 @@
 //! One function says both, so that they cannot disagree.
 
 use crate::Bundle;
-use crate::cell::{Layer, NodeRow, RowSheets, Sheet};
-use crate::format;
+use crate::format::{self, SPACE_CUBIC};
 use crate::key::Key;
 use crate::lists::{self, Lists};
 use crate::nodes;
 use crate::record::Stream;
+use crate::row::{Layer, NodeRow};
+use crate::sheet::{RowSheets, Sheet};
 use bytemuck::Pod;
 
 /// The caller's memory, cut up.
@@ -17,8 +18,11 @@ pub struct Workspace<'m> {
     pub palette: &'m mut [u16],
     /// The keys, and what they are decoded with.
     pub stream: Stream<'m>,
-    /// The nodes above and below the current row of cells.
-    pub rows: [NodeRow<'m>; 2],
+    /// The rows of nodes around the current row of cells: the one above that, its upper and its lower edge, the one below.
+    /// Where space is linear, only the inner two have room.
+    pub rows: [NodeRow<'m>; 4],
+    /// Where space is cubic, what lies halfway down the row of cells.
+    pub halfway: NodeRow<'m>,
     /// The sheets of the current row of cells.
     pub sheets: RowSheets<'m>,
 }
@@ -50,6 +54,18 @@ fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
     let slots = back.saturating_add(ahead).saturating_add(1).max(3);
     let fields = usize::from(limits.fields);
     let one_more = |count: usize| count.saturating_add(1);
+    let cubic = bundle.path().space == SPACE_CUBIC;
+    let if_cubic = |count: usize| if cubic { count } else { 0 };
+    let row_sheets = usize::from(limits.row_sheets);
+    let node_row = |cutter: &mut Cutter<'m>, wanted: bool, fields: bool| {
+        let if_wanted = |count: usize| if wanted { count } else { 0 };
+        NodeRow {
+            start: cutter.take(if_wanted(one_more(grid.node_columns()))),
+            label: cutter.take(if_wanted(row_layers)),
+            layer: cutter.take::<Layer>(if_wanted(row_layers)),
+            field: cutter.take::<[i16; 2]>(if fields { if_wanted(row_layers) } else { 0 }),
+        }
+    };
     Workspace {
         palette: cutter.take(256),
         stream: Stream {
@@ -72,13 +88,13 @@ fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
                 Lists::new(rows, data).at_most(limits.cell_sheets)
             }),
         },
-        rows: core::array::from_fn(|_| NodeRow {
-            start: cutter.take(one_more(grid.node_columns())),
-            label: cutter.take(row_layers),
-            layer: cutter.take::<Layer>(row_layers),
-            field: cutter.take::<[i32; 2]>(if fields > 0 { row_layers } else { 0 }),
-        }),
-        sheets: RowSheets { start: cutter.take(one_more(grid.columns)), sheet: cutter.take::<Sheet>(usize::from(limits.row_sheets)) },
+        rows: core::array::from_fn(|row| node_row(cutter, cubic || row == 1 || row == 2, fields > 0)),
+        halfway: node_row(cutter, cubic, false),
+        sheets: RowSheets {
+            start: cutter.take(one_more(grid.columns)),
+            sheet: cutter.take::<Sheet>(row_sheets),
+            middle: cutter.take(if_cubic(row_sheets)),
+        },
     }
 }
 

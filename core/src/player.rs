@@ -1,14 +1,15 @@
 //! The player: new, seek, row. Keys are decoded into the caller's memory by `seek`, pixels are made by `row`.
 
-use crate::cell::{Around, NodeRow, RowSheets};
 use crate::coder::Decoder;
 use crate::coverage::Chart;
 use crate::fixed::PlayUv;
-use crate::format::{self, Limits, STRIP};
+use crate::format::{self, Limits, SPACE_CUBIC, STRIP};
 use crate::key::Nothing;
 use crate::lists::{CHART, FIELD};
 use crate::memory::{self, Workspace};
 use crate::record::Shape;
+use crate::row::Around;
+use crate::sheet::Part;
 use crate::span::{self, Test};
 use crate::timeline::Moment;
 use crate::{Bundle, MemoryError};
@@ -36,6 +37,8 @@ pub struct Work {
     pub keys: u32,
     /// Layers interpolated in time.
     pub layers: u32,
+    /// Layers worked out halfway between two rows of nodes.
+    pub middles: u32,
     /// Pixels drawn in smooth cells.
     pub smooth_pixels: u32,
     /// Pixels drawn in torn cells.
@@ -219,7 +222,7 @@ impl<'a> Player<'a> {
             return;
         }
         let Ok(palette) = <&[u16; 256]>::try_from(&*self.space.palette) else { return };
-        let drawing = Drawing { bundle: self.bundle, rows: &self.space.rows, sheets: &self.space.sheets };
+        let drawing = Drawing::new(self.bundle, &self.space);
         drawing.row(y, out, &mut self.work, |uv, _| palette.get(usize::from(texture.texel(uv))).copied().unwrap_or(0));
     }
 
@@ -228,7 +231,7 @@ impl<'a> Player<'a> {
         if !self.ready(y) {
             return;
         }
-        let drawing = Drawing { bundle: self.bundle, rows: &self.space.rows, sheets: &self.space.sheets };
+        let drawing = Drawing::new(self.bundle, &self.space);
         drawing.row(y, out, &mut self.work, |at, label| Probe { label, at });
     }
 
@@ -249,33 +252,46 @@ impl<'a> Player<'a> {
         let age = self.needed().ahead;
         let bundle = self.bundle;
         let from = self.moment.interval as isize;
-        let Workspace { stream, rows, sheets, .. } = &mut self.space;
+        let Workspace { stream, rows, halfway, sheets, .. } = &mut self.space;
         let at = |offset: isize| {
             let inside = bundle.looping() || (0..bundle.key_count() as isize).contains(&from.wrapping_add(offset));
             stream.key(age.checked_add_signed(offset.wrapping_neg())?).filter(|_| inside)
         };
         let Some((start, lists)) = stream.key(age).zip(stream.lists(age)) else { return };
-        let cubic = format::reach(bundle.path().time).0 == 1;
+        let cubic_time = format::reach(bundle.path().time).0 == 1;
         let around = Around {
-            before: at(-1).filter(|_| cubic),
+            before: at(-1).filter(|_| cubic_time),
             from: start,
             // A path of one key has nothing to move on to.
             to: at(1).unwrap_or(start),
-            after: at(2).filter(|_| cubic),
+            after: at(2).filter(|_| cubic_time),
         };
-        let mut fill = |nodes: &mut NodeRow<'_>, row: usize| {
-            let layers = nodes.fill(grid, row, &around, &self.moment);
-            self.work.layers = self.work.layers.wrapping_add(layers);
+        let cubic = bundle.path().space == SPACE_CUBIC;
+        // Going down, the rows of nodes around the last row of cells are those around this one, but for the lowest.
+        let down = row > 0 && self.loaded == Some(row.wrapping_sub(1));
+        let known = match (down, cubic) {
+            (false, _) => 0,
+            (true, true) => 3,
+            (true, false) => 2,
         };
-        let [top, bottom] = rows;
-        // Going down, the nodes below the last row of cells are those above this one.
-        if row > 0 && self.loaded == Some(row.wrapping_sub(1)) {
-            core::mem::swap(top, bottom);
-        } else {
-            fill(top, row);
+        match rows {
+            [_, top, bottom, _] if down && !cubic => core::mem::swap(top, bottom),
+            _ if down => rows.rotate_left(1),
+            _ => {}
         }
-        fill(bottom, row.wrapping_add(1));
-        sheets.fill(grid, row, lists, top, bottom);
+        for (place, nodes) in rows.iter_mut().enumerate().skip(known) {
+            // The second row of the four is the row of cells' upper edge; the outer two are for the middles alone.
+            if cubic || place == 1 || place == 2 {
+                let layers = nodes.fill(grid, row.wrapping_add(place).checked_sub(1), &around, &self.moment);
+                self.work.layers = self.work.layers.wrapping_add(layers);
+            }
+        }
+        let [before, top, bottom, after] = &*rows;
+        if cubic {
+            let layers = halfway.between(grid.node_columns(), [before, top, bottom, after]);
+            self.work.middles = self.work.middles.wrapping_add(layers);
+        }
+        sheets.fill(grid, row, lists, [top, halfway, bottom], cubic);
         self.loaded = Some(row);
     }
 
@@ -301,38 +317,48 @@ impl<'a> Player<'a> {
 /// A loaded row of cells, ready to be drawn.
 struct Drawing<'d, 'a> {
     bundle: &'d Bundle<'a>,
-    rows: &'d [NodeRow<'a>; 2],
-    sheets: &'d RowSheets<'a>,
+    space: &'d Workspace<'a>,
 }
 
-impl Drawing<'_, '_> {
+impl<'d, 'a> Drawing<'d, 'a> {
+    const fn new(bundle: &'d Bundle<'a>, space: &'d Workspace<'a>) -> Self {
+        Self { bundle, space }
+    }
+
     /// Draws pixel row `y`, which lies in the loaded row of cells; `make` turns a position and its label into a pixel.
     #[inline(always)]
     fn row<T: Default>(&self, y: u32, out: &mut [T], work: &mut Work, make: impl Fn(PlayUv, u8) -> T) {
-        let log2 = self.bundle.grid().log2;
-        let step = y & (1u32 << log2).wrapping_sub(1);
+        let cell = self.bundle.grid().log2;
+        let cubic = self.bundle.path().space == SPACE_CUBIC;
+        let log2 = if cubic { cell.wrapping_sub(1) } else { cell };
+        let step = y & (1u32 << cell).wrapping_sub(1);
         let texture = self.bundle.texture();
-        let [top, bottom] = self.rows;
+        let [_, top, bottom, _] = &self.space.rows;
         let drawn = out.len().min(self.bundle.size().0 as usize);
         let out = out.get_mut(..drawn).unwrap_or(&mut []);
         for (column, pixels) in out.chunks_mut(1 << log2).enumerate() {
-            let Some((back, front)) = self.sheets.cell(column).split_last() else {
+            let (column, half) = if cubic { (column >> 1, Some(column & 1 == 1)) } else { (column, None) };
+            let rows = [top, &self.space.halfway, bottom];
+            let part = Part { sheets: &self.space.sheets, rows, half, step, log2: cell };
+            let (first, sheets) = self.space.sheets.cell(column);
+            let Some((back, front)) = sheets.split_last() else {
                 // Only a broken bundle has a cell without sheets.
                 pixels.fill_with(T::default);
                 continue;
             };
             let count = pixels.len() as u32;
-            span::all(pixels, back.span(top, bottom, step, log2), &texture, |uv| make(uv, back.label()));
+            span::all(pixels, part.span(first.wrapping_add(front.len()), back), &texture, |uv| make(uv, back.label()));
             // Back to front: the frontmost sheet that covers a pixel has the last word.
-            for sheet in front.iter().rev() {
+            for (place, sheet) in front.iter().enumerate().rev() {
+                let index = first.wrapping_add(place);
                 let record = self.bundle.label(sheet.label());
                 let test = Test {
                     chart: (sheet.test() != FIELD).then(|| Chart::new(&record)),
-                    fields: (sheet.test() != CHART).then(|| sheet.fields(top, bottom, step, log2)),
+                    fields: (sheet.test() != CHART).then(|| part.fields(sheet)),
                     strip: sheet.test() != CHART && record.flags & STRIP != 0,
                     texture,
                 };
-                span::covered(pixels, sheet.span(top, bottom, step, log2), &test, |uv| make(uv, sheet.label()));
+                span::covered(pixels, part.span(index, sheet), &test, |uv| make(uv, sheet.label()));
                 work.coverage_tests = work.coverage_tests.wrapping_add(count);
             }
             let kind = if front.is_empty() { &mut work.smooth_pixels } else { &mut work.torn_pixels };

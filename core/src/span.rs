@@ -78,6 +78,13 @@ impl Fields {
         let step = [c.wrapping_sub(a).wrapping_add(half) >> log2, d.wrapping_sub(b).wrapping_add(half) >> log2];
         Self { from: [a, b], step }
     }
+
+    /// The same fields from `pixels` pixels on.
+    #[must_use]
+    pub const fn after(self, pixels: i32) -> Self {
+        let ([a, b], [da, db]) = (self.from, self.step);
+        Self { from: [a.wrapping_add(da.wrapping_mul(pixels)), b.wrapping_add(db.wrapping_mul(pixels))], step: self.step }
+    }
 }
 
 /// What decides whether a sheet shows at a pixel: its chart, its fields, or both.

@@ -5,7 +5,7 @@
 use cubist_core::Bundle;
 use cubist_core::coder::{Decoder, Probability};
 use cubist_core::fixed::ONE;
-use cubist_core::format::{MASK, MASKED, STRIP, TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
+use cubist_core::format::{MASK, MASKED, SPACE_CUBIC, STRIP, TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
 use cubist_core::grid::Grid;
 use cubist_core::key::{Key, Nothing};
 use cubist_core::lists::{self, CHART, FIELD, Lists};
@@ -198,33 +198,53 @@ impl<'a> Reference<'a> {
         picture
     }
 
-    /// The sheets of a cell, front to back, with their four corners at one moment.
+    /// The sheets of a cell, front to back, at one moment.
     fn sheets(&self, moment: &Moment, column: usize, row: usize) -> Vec<Sheet> {
-        let nodes = self.grid.columns + 1;
-        let corner = row * nodes + column;
-        let corners = [corner, corner + 1, corner + nodes, corner + nodes + 1];
         let listed = &self.lists[moment.interval][row * self.grid.columns + column];
-        listed.iter().filter_map(|&(label, test)| self.sheet(moment, corners, label, test)).collect()
+        listed.iter().filter_map(|&(label, test)| self.sheet(moment, [column, row], label, test)).collect()
     }
 
-    /// The sheet of `label` between nodes; `None` where one carries no such layer.
-    fn sheet(&self, moment: &Moment, nodes: [usize; 4], label: u8, test: u16) -> Option<Sheet> {
-        let mut sheet = Sheet { label, test, corners: [[0.0; 2]; 4], motion: 0.0, fields: [[0.0; 2]; 4], shift: 0.0 };
-        for (corner, node) in nodes.into_iter().enumerate() {
-            let layers = moment.keys.map(|key| self.keys[key?][node].iter().find(|layer| layer.label == label));
-            let (start, end) = (layers[1]?, layers[2]?);
-            let weights = moment.weights[usize::from(layers[0].is_none()) + 2 * usize::from(layers[3].is_none())];
-            for axis in 0..2 {
-                let weighted = layers.iter().zip(weights).map(|(layer, weight)| layer.map_or(0.0, |layer| layer.at[axis] * weight));
-                sheet.corners[corner][axis] = weighted.sum();
-                let apart = layers.iter().flatten().map(|layer| (layer.at[axis] - start.at[axis]).abs());
-                sheet.motion = apart.fold(sheet.motion, f64::max);
-                let [from, to] = [start, end].map(|layer| layer.fields[axis]);
-                sheet.fields[corner][axis] = from + (to - from) * moment.linear;
-                sheet.shift = sheet.shift.max((to - from).abs());
-            }
+    /// The sheet of `label` in a cell; `None` where a corner carries no such layer.
+    fn sheet(&self, moment: &Moment, [column, row]: [usize; 2], label: u8, test: u16) -> Option<Sheet> {
+        let mut sheet = Sheet { label, test, points: [[0.0; 2]; 9], motion: 0.0, fields: [[0.0; 2]; 4], shift: 0.0 };
+        let cubic = self.bundle.path().space == SPACE_CUBIC;
+        // The nodes around the cell, four by four, counted from its upper left corner.
+        let mut node = |across: isize, down: isize| -> Option<Layer> {
+            let inside = |at: usize, step: isize, count: usize| at.checked_add_signed(step).filter(|&at| at < count);
+            let (column, row) = (inside(column, across, self.grid.columns + 1)?, inside(row, down, self.grid.rows + 1)?);
+            self.layer(moment, row * (self.grid.columns + 1) + column, label, &mut sheet.motion, &mut sheet.shift)
+        };
+        for (corner, [across, down]) in [[0, 0], [1, 0], [0, 1], [1, 1]].into_iter().enumerate() {
+            sheet.fields[corner] = node(across, down)?.fields;
+        }
+        // The four columns halfway down, and the two edges: what lies halfway across each.
+        let mut nodes = |row: isize| [-1, 0, 1, 2].map(|column| Some(node(column, row).filter(|_| cubic || (0..2).contains(&column))?.at));
+        let [above, top, bottom, below] = [-1, 0, 1, 2].map(&mut nodes);
+        let outer = |row: [Option<[f64; 2]>; 4]| if cubic { row } else { [None; 4] };
+        let (above, below) = (outer(above), outer(below));
+        let halfway = [0, 1, 2, 3].map(|column: usize| middle([above[column], top[column], bottom[column], below[column]]));
+        for (place, row) in [top, halfway, bottom].into_iter().enumerate() {
+            (sheet.points[3 * place], sheet.points[3 * place + 1], sheet.points[3 * place + 2]) = (row[1]?, middle(row)?, row[2]?);
         }
         Some(sheet)
+    }
+
+    /// The layer of `label` at a node at one moment; `None` where either end of the interval carries none. The farthest that its keys are
+    /// apart raises `motion`, texels, and `shift`, pixels.
+    fn layer(&self, moment: &Moment, node: usize, label: u8, motion: &mut f64, shift: &mut f64) -> Option<Layer> {
+        let layers = moment.keys.map(|key| self.keys[key?][node].iter().find(|layer| layer.label == label));
+        let (start, end) = (layers[1]?, layers[2]?);
+        let weights = moment.weights[usize::from(layers[0].is_none()) + 2 * usize::from(layers[3].is_none())];
+        let mut now = Layer { label, at: [0.0; 2], fields: [0.0; 2] };
+        for axis in 0..2 {
+            now.at[axis] = layers.iter().zip(weights).map(|(layer, weight)| layer.map_or(0.0, |layer| layer.at[axis] * weight)).sum();
+            let apart = layers.iter().flatten().map(|layer| (layer.at[axis] - start.at[axis]).abs());
+            *motion = apart.fold(*motion, f64::max);
+            let [from, to] = [start, end].map(|layer| layer.fields[axis]);
+            now.fields[axis] = from + (to - from) * moment.linear;
+            *shift = shift.max((to - from).abs());
+        }
+        Some(now)
     }
 
     /// The first sheet whose test lets it show at the place `within` the cell; the last one needs no test.
@@ -232,7 +252,7 @@ impl<'a> Reference<'a> {
         let size = self.size();
         let (mut motion, mut margin, mut outline, mut shift) = (0.0f64, f64::INFINITY, f64::INFINITY, 0.0f64);
         for (index, sheet) in sheets.iter().enumerate() {
-            let at = bilinear(&sheet.corners, within);
+            let at = quartered(&sheet.points, within);
             let last = index + 1 == sheets.len();
             let mut shows = true;
             if !last && sheet.test != CHART {
@@ -295,14 +315,34 @@ struct Moment {
     linear: f64,
 }
 
-/// A sheet of a cell at one moment: corners top left, top right, bottom left, bottom right.
+/// A sheet of a cell at one moment: three rows of three points, and the fields at the corners top left, top right, bottom left, bottom right.
 struct Sheet {
     label: u8,
     test: u16,
-    corners: [[f64; 2]; 4],
+    points: [[f64; 2]; 9],
     motion: f64,
     fields: [[f64; 2]; 4],
     shift: f64,
+}
+
+/// The value halfway between the inner two of four in a row: on the cubic through all of them, the parabola through three, the line
+/// through two; `None` without the inner two.
+fn middle([before, from, to, after]: [Option<[f64; 2]>; 4]) -> Option<[f64; 2]> {
+    let (from, to) = (from?, to?);
+    Some([0, 1].map(|axis: usize| match (before, after) {
+        (Some(before), Some(after)) => (9.0 * (from[axis] + to[axis]) - before[axis] - after[axis]) / 16.0,
+        (Some(before), None) => (6.0 * from[axis] + 3.0 * to[axis] - before[axis]) / 8.0,
+        (None, Some(after)) => (3.0 * from[axis] + 6.0 * to[axis] - after[axis]) / 8.0,
+        (None, None) => (from[axis] + to[axis]) / 2.0,
+    }))
+}
+
+/// The value `x` and `y` of the way through a cell, which is bilinear in each quarter.
+fn quartered(points: &[[f64; 2]; 9], [x, y]: [f64; 2]) -> [f64; 2] {
+    let (right, lower) = (usize::from(x >= 0.5), usize::from(y >= 0.5));
+    let first = 3 * lower + right;
+    let quarter = [points[first], points[first + 1], points[first + 3], points[first + 4]];
+    bilinear(&quarter, [2.0 * x - right as f64, 2.0 * y - lower as f64])
 }
 
 /// The value `x` and `y` of the way through a cell, from those at its corners.

@@ -6,7 +6,10 @@
 //! - the left and the right end of a span downwards: 1 / 2^16;
 //! - the step along it to nearest: (cell - 1) / 2^17 at its last pixel.
 //!
-//! A field, in pixels, is rounded downwards in time as well: 1 / 2^17 more.
+//! Where space is cubic, a span is half a cell long, and a value halfway between others is rounded downwards, to at most 1 / 2^16 less,
+//! and up to 5/4 as far off as these: after two such steps, down and across, 6 / 2^17 instead of the layer's 1 / 2^17.
+//!
+//! A field, in pixels, is rounded downwards to 1 / 2^8 in time.
 //!
 //! Time weights are exact at keys 1, 2, 4, 8 or 16 frames apart throughout. Elsewhere each is rounded to 1 / 2^14, once; that moves
 //! whole sheets, in time only, and by as much as the keys are apart: half a unit for each of three of the keys, times how
@@ -19,7 +22,7 @@ use cubist_baker::bake::Settings;
 use cubist_baker::scene::builtin;
 use cubist_core::Bundle;
 use cubist_core::fixed::{MAX_FIELD, ONE, field_distance};
-use cubist_core::format::{TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
+use cubist_core::format::{SPACE_CUBIC, SPACE_LINEAR, TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
 use cubist_core::timeline;
 use cubist_tests::reference::{Pixel, Reference, Weights};
 use cubist_tests::{play, reference, scenes};
@@ -57,11 +60,15 @@ impl Found {
 }
 
 /// The bounds of one pixel: on positions, texels, and on fields, pixels.
-fn bounds(pixel: &Pixel, cell: u32, weights: Weights) -> [f64; 2] {
+fn bounds(pixel: &Pixel, cell: u32, space: u8, weights: Weights) -> [f64; 2] {
     let unit = 1.0 / f64::from(1u32 << 17);
     let off = if weights == Weights::Exact { WEIGHT } else { 0.0 };
+    let (rounded, spread) = if space == SPACE_CUBIC { (cell / 2 + 7, 25.0 / 16.0) } else { (cell + 2, 1.0) };
     // The slack is what f64 itself rounds.
-    [f64::from(cell + 2) * unit + 3.0 * off * pixel.motion + 1e-9, f64::from(cell + 3) * unit + off * pixel.shift + 1e-9]
+    [
+        f64::from(rounded) * unit + spread * 3.0 * off * pixel.motion + 1e-9,
+        1.0 / 256.0 + f64::from(cell + 2) * unit + off * pixel.shift + 1e-9,
+    ]
 }
 
 fn compare(bytes: &[u8], frames: impl IntoIterator<Item = u32>, weights: Weights, round: bool) -> Found {
@@ -75,7 +82,7 @@ fn compare(bytes: &[u8], frames: impl IntoIterator<Item = u32>, weights: Weights
         for (index, (exact, (colour, probe))) in reference.frame(frame, weights).iter().zip(colours.into_iter().zip(probes)).enumerate() {
             let place = || format!("frame {frame}, pixel ({}, {})", index % width, index / width);
             let exact = exact.unwrap_or_else(|| panic!("{}: no sheet shows", place()));
-            let [bound, outline] = bounds(&exact, cell, if round { Weights::Player } else { weights });
+            let [bound, outline] = bounds(&exact, cell, bundle.path().space, if round { Weights::Player } else { weights });
             let at = [probe.at.u, probe.at.v].map(|x| f64::from(x) / 65_536.0);
             if probe.label == exact.label {
                 let apart = (at[0] - exact.at[0]).abs().max((at[1] - exact.at[1]).abs());
@@ -191,7 +198,7 @@ fn field_codes_are_four_to_an_octave() {
 #[test]
 fn cells_and_straight_intervals_of_eight_are_exact() {
     // 5 bits of a stored coordinate, 3 of time, 3 down, 3 across: 14 of the 16 there are.
-    let bytes = bake("street", SIZE, 33, &Settings { time: TIME_LINEAR, ..settings(8, 8) });
+    let bytes = bake("street", SIZE, 33, &Settings { time: TIME_LINEAR, space: SPACE_LINEAR, ..settings(8, 8) });
     let found = check("street, 8 and 8", &bytes, [0, 1, 7, 8, 15, 20, 31, 32]);
     // A field has 8 bits: there the last of the step across is rounded.
     assert_eq!(found.apart, 0.0, "{found:?}");

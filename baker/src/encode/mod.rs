@@ -81,6 +81,7 @@ pub fn bundle(content: &Content<'_>, settings: CodingSettings, header: Header<'_
         looping: grid.looping,
         cell_log2: grid.grid.log2 as u8,
         time: grid.time,
+        space: grid.space,
         step_log2: settings.step_log2,
         limits: bounds,
         table: &table,
