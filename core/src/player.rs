@@ -8,7 +8,7 @@ use crate::format::{self, Limits, STRIP};
 use crate::key::Nothing;
 use crate::lists::{CHART, FIELD};
 use crate::memory::{self, Workspace};
-use crate::record::Shape;
+use crate::record::{Place, Shape};
 use crate::span::{self, Test};
 use crate::timeline::Moment;
 use crate::{Bundle, MemoryError};
@@ -32,8 +32,11 @@ pub enum ByteOrder {
 /// Work done since the last `seek`, for figures and overlays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Work {
-    /// Keys that the seek decoded.
+    /// Keys that the seek decoded, whole or what was left of them.
     pub keys: u32,
+    /// Slices that it decoded, of those keys and of the next one: a slice is a row of nodes or a few rows of cells (see
+    /// [`Place::slices`]).
+    pub slices: u32,
     /// Layers interpolated in time.
     pub layers: u32,
     /// Pixels drawn in smooth cells.
@@ -63,6 +66,19 @@ struct Last {
     chain: usize,
 }
 
+/// A key that is being decoded.
+#[derive(Clone, Debug)]
+struct Coming<'a> {
+    run: u32,
+    place: Place,
+    bits: Decoder<'a>,
+    /// Slices of it, and how many of them are decoded.
+    slices: usize,
+    done: usize,
+    /// Frames of the interval that have had their share of the slices.
+    served: u32,
+}
+
 /// The keys that a moment needs.
 struct Needed {
     first: usize,
@@ -80,8 +96,10 @@ pub struct Player<'a> {
     space: Workspace<'a>,
     frame: Frame,
     moment: Moment,
-    /// The last key decoded.
+    /// The last key that the frame needed.
     last: Option<Last>,
+    /// The key after it, as far as it is decoded.
+    coming: Option<Coming<'a>>,
     /// The row of cells that `space.rows` and `space.sheets` hold.
     loaded: Option<usize>,
     work: Work,
@@ -100,7 +118,7 @@ impl<'a> Player<'a> {
         }
         let space = memory::workspace(bundle, memory).ok_or(too_small)?;
         let moment = bundle.moment(0);
-        let mut player = Self { bundle, space, frame: Frame(0), moment, last: None, loaded: None, work: Work::default() };
+        let mut player = Self { bundle, space, frame: Frame(0), moment, last: None, coming: None, loaded: None, work: Work::default() };
         player.set_byte_order(ByteOrder::Native);
         player.seek(Frame(0));
         Ok(player)
@@ -129,8 +147,10 @@ impl<'a> Player<'a> {
 
     /// Makes `frame` the current frame; past the end it wraps on a looping bundle, else the last frame stays.
     ///
-    /// Decodes at most [`Limits::seek_keys`] keys: none while the frame stays between the same two keys, one when it moves
-    /// on past the second (none where the path's end is near). Backwards, or far ahead, it starts at an independent key.
+    /// What the frame needs and is not there is decoded, at most [`Limits::seek_keys`] keys: backwards, or far ahead, from an
+    /// independent key on. Then the next key is decoded ahead, as much of it as of the interval has passed, so that playback that goes
+    /// on finds it there: each of an interval's n frames decodes an n-th of a key, none a whole one. A seek that has already decoded
+    /// as many keys as it may leaves the next one to the frames after it.
     pub fn seek(&mut self, frame: Frame) {
         let frames = self.bundle.frames();
         let frame = if self.bundle.looping() { frame.0.checked_rem(frames).unwrap_or(0) } else { frame.0.min(frames.saturating_sub(1)) };
@@ -138,7 +158,6 @@ impl<'a> Player<'a> {
         self.loaded = None;
         self.frame = Frame(frame);
         self.moment = self.bundle.moment(frame);
-        let keys = self.bundle.key_count();
         let Needed { first, last, span, .. } = self.needed();
         // Either on from the last key, or from the independent key at or before the first one needed.
         let on = self.last.map(|state| (state, self.distance(state.key, last))).filter(|(state, on)| {
@@ -151,15 +170,21 @@ impl<'a> Player<'a> {
         let (mut key, count) = match on {
             Some((state, on)) if on <= anew => (state.key.saturating_add(1), on),
             _ => {
-                self.last = None;
+                (self.last, self.coming) = (None, None);
                 (start, anew)
             }
         };
         for _ in 0..count {
-            key = key.checked_rem(keys).unwrap_or(0);
-            self.decode(key);
+            key = self.wrapped(key);
+            self.finish(key);
             key = key.saturating_add(1);
         }
+        self.ahead(last);
+    }
+
+    /// `key` on the timeline: past the last one of a looping path comes the first.
+    fn wrapped(&self, key: usize) -> usize {
+        key.checked_rem(self.bundle.key_count()).unwrap_or(0)
     }
 
     /// The keys that the current moment needs.
@@ -279,22 +304,65 @@ impl<'a> Player<'a> {
         self.loaded = Some(row);
     }
 
-    /// Decodes `key`, which follows the last one decoded or is independent.
-    fn decode(&mut self, key: usize) {
+    /// Takes up `key`, which follows the last one or is independent, where it was left, or begins it.
+    fn take_up(&mut self, key: usize) -> Coming<'a> {
         let bundle = self.bundle;
-        let run = match self.last {
-            Some(last) if !bundle.key(key).independent => last.run.saturating_add(1),
-            _ => 0,
-        };
+        self.coming.take().unwrap_or_else(|| {
+            let run = match self.last {
+                Some(last) if !bundle.key(key).independent => last.run.saturating_add(1),
+                _ => 0,
+            };
+            let place = bundle.place(key, run);
+            Coming { run, place, bits: Decoder::new(bundle.record(key)), slices: place.slices(bundle.grid()), done: 0, served: 0 }
+        })
+    }
+
+    /// Decodes what is missing of `key`, which becomes the last one.
+    fn finish(&mut self, key: usize) {
+        let mut coming = self.take_up(key);
+        self.decode(&mut coming, usize::MAX);
+        self.space.stream.finish();
+        self.last = Some(Last { key, run: coming.run, chain: self.last.map_or(0, |last| last.chain).saturating_add(1) });
+    }
+
+    /// Decodes the key after `last` as far as it is due at the current moment.
+    fn ahead(&mut self, last: usize) {
+        let (next, Moment { passed, length, .. }) = (self.wrapped(last.saturating_add(1)), self.moment);
+        // A path that ends has no key after its last one; on a loop of one key the next is the same.
+        if next == last || (next == 0 && !self.bundle.looping()) {
+            return;
+        }
+        let mut coming = self.take_up(next);
+        let frame = passed.saturating_add(1).min(length);
+        // Here every frame has the same share of what the frames before have left over: where they came one by one, of the key.
+        let frames = u64::from(frame.saturating_sub(coming.served));
+        let left = coming.slices.saturating_sub(coming.done) as u64;
+        let shares = u64::from(length.saturating_sub(coming.served));
+        let due = left.saturating_mul(frames).saturating_add(shares.saturating_sub(1)).checked_div(shares).unwrap_or(0);
+        if self.work.keys < u32::from(self.bundle.limits().seek_keys) {
+            self.decode(&mut coming, due as usize);
+        }
+        coming.served = coming.served.max(frame);
+        self.coming = Some(coming);
+    }
+
+    /// Decodes up to `count` more slices of `coming`.
+    fn decode(&mut self, coming: &mut Coming<'a>, count: usize) {
+        let bundle = self.bundle;
         let shape = Shape {
             grid: bundle.grid(),
             labels: bundle.label_count(),
             label: |label| bundle.label(label),
             step_log2: u32::from(bundle.path().step_log2),
         };
-        self.space.stream.code(&mut Decoder::new(bundle.record(key)), shape, bundle.place(key, run), &mut Nothing);
-        self.last = Some(Last { key, run, chain: self.last.map_or(0, |last| last.chain).saturating_add(1) });
-        self.work.keys = self.work.keys.wrapping_add(1);
+        for slice in (coming.done..coming.slices).take(count) {
+            self.space.stream.slice(&mut coming.bits, shape, coming.place, slice, &mut Nothing);
+            self.work.slices = self.work.slices.wrapping_add(1);
+            coming.done = slice.saturating_add(1);
+            if coming.done == coming.slices {
+                self.work.keys = self.work.keys.wrapping_add(1);
+            }
+        }
     }
 }
 

@@ -322,7 +322,10 @@ fn lists_of_noise_hold_known_tests_and_labels_only() {
         let mut contexts = vec![Probability::NEW; lists::CONTEXTS];
         // What is wanted is not what the bits say, and has tests that there are none of.
         let wanted = Sheets { labels: [1, 2, 3].into_iter().collect(), tests: 0xffff };
-        lists::code(&mut Noise(Random(seed)), &mut contexts, grid, 7, None, &mut lists, &mut |_| wanted.clone());
+        let mut noise = Noise(Random(seed));
+        for row in 0..grid.rows {
+            lists::code_row(&mut noise, &mut contexts, grid, 7, None, &mut lists, row, &mut |_| wanted.clone());
+        }
         for row in 0..grid.rows {
             let mut cursor = lists.row(row);
             for _ in 0..grid.columns {
