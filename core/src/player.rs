@@ -32,11 +32,12 @@ pub enum ByteOrder {
 /// Work done since the last `seek`, for figures and overlays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Work {
-    /// Keys that the seek decoded, whole or what was left of them.
+    /// Keys that the seek decoded whole, or whose last slice it decoded.
     pub keys: u32,
-    /// Slices that it decoded, of those keys and of the next one: a slice is a row of nodes or a few rows of cells (see
-    /// [`Place::slices`]).
+    /// Slices of keys that it decoded: a slice is a row of nodes, or the lists of a few rows of cells.
     pub slices: u32,
+    /// Bytes that it read of those keys' records.
+    pub record_bytes: u32,
     /// Layers interpolated in time.
     pub layers: u32,
     /// Pixels drawn in smooth cells.
@@ -75,8 +76,21 @@ struct Coming<'a> {
     /// Slices of it, and how many of them are decoded.
     slices: usize,
     done: usize,
-    /// Frames of the interval that have had their share of the slices.
-    served: u32,
+    /// What there was to do in all, as [`Coming::left`] counts.
+    whole: u64,
+    /// Frames of the interval that have no share in it.
+    from: u32,
+}
+
+/// What a slice costs besides the bytes it reads, as so many bytes more: a row costs its time even where the record hardly says anything.
+const SLICE_COST: u64 = 32;
+
+impl Coming<'_> {
+    /// What is left to do, in bytes: those of the record are a fair measure of the time it takes.
+    fn left(&self) -> u64 {
+        let slices = self.slices.saturating_sub(self.done) as u64;
+        slices.saturating_mul(SLICE_COST).saturating_add(self.bits.left() as u64)
+    }
 }
 
 /// The keys that a moment needs.
@@ -313,14 +327,16 @@ impl<'a> Player<'a> {
                 _ => 0,
             };
             let place = bundle.place(key, run);
-            Coming { run, place, bits: Decoder::new(bundle.record(key)), slices: place.slices(bundle.grid()), done: 0, served: 0 }
+            let slices = place.slices(bundle.grid());
+            let coming = Coming { run, place, bits: Decoder::new(bundle.record(key)), slices, done: 0, whole: 0, from: 0 };
+            Coming { whole: coming.left(), ..coming }
         })
     }
 
     /// Decodes what is missing of `key`, which becomes the last one.
     fn finish(&mut self, key: usize) {
         let mut coming = self.take_up(key);
-        self.decode(&mut coming, usize::MAX);
+        self.decode(&mut coming, 0);
         self.space.stream.finish();
         self.last = Some(Last { key, run: coming.run, chain: self.last.map_or(0, |last| last.chain).saturating_add(1) });
     }
@@ -334,20 +350,22 @@ impl<'a> Player<'a> {
         }
         let mut coming = self.take_up(next);
         let frame = passed.saturating_add(1).min(length);
-        // Here every frame has the same share of what the frames before have left over: where they came one by one, of the key.
-        let frames = u64::from(frame.saturating_sub(coming.served));
-        let left = coming.slices.saturating_sub(coming.done) as u64;
-        let shares = u64::from(length.saturating_sub(coming.served));
-        let due = left.saturating_mul(frames).saturating_add(shares.saturating_sub(1)).checked_div(shares).unwrap_or(0);
         if self.work.keys < u32::from(self.bundle.limits().seek_keys) {
-            self.decode(&mut coming, due as usize);
+            // Every frame has the same share, to the nearest slice; the last one does all that is left.
+            let (frames, shares) = (frame.saturating_sub(coming.from), length.saturating_sub(coming.from));
+            let due = coming.whole.saturating_mul(u64::from(frames)).checked_div(u64::from(shares)).unwrap_or(0);
+            let slice = coming.whole.checked_div(coming.slices as u64).unwrap_or(0);
+            let rounded = if frames < shares { due.saturating_sub(slice >> 1) } else { due };
+            let left = coming.whole.saturating_sub(rounded);
+            self.decode(&mut coming, left);
+        } else {
+            coming.from = coming.from.max(frame);
         }
-        coming.served = coming.served.max(frame);
         self.coming = Some(coming);
     }
 
-    /// Decodes up to `count` more slices of `coming`.
-    fn decode(&mut self, coming: &mut Coming<'a>, count: usize) {
+    /// Decodes slices of `coming` until no more than `left` is left to do.
+    fn decode(&mut self, coming: &mut Coming<'a>, left: u64) {
         let bundle = self.bundle;
         let shape = Shape {
             grid: bundle.grid(),
@@ -355,14 +373,14 @@ impl<'a> Player<'a> {
             label: |label| bundle.label(label),
             step_log2: u32::from(bundle.path().step_log2),
         };
-        for slice in (coming.done..coming.slices).take(count) {
-            self.space.stream.slice(&mut coming.bits, shape, coming.place, slice, &mut Nothing);
+        let bytes = coming.bits.left();
+        while coming.done < coming.slices && coming.left() > left {
+            self.space.stream.slice(&mut coming.bits, shape, coming.place, coming.done, &mut Nothing);
+            coming.done = coming.done.saturating_add(1);
             self.work.slices = self.work.slices.wrapping_add(1);
-            coming.done = slice.saturating_add(1);
-            if coming.done == coming.slices {
-                self.work.keys = self.work.keys.wrapping_add(1);
-            }
+            self.work.keys = self.work.keys.wrapping_add(u32::from(coming.done == coming.slices));
         }
+        self.work.record_bytes = self.work.record_bytes.wrapping_add(bytes.saturating_sub(coming.bits.left()) as u32);
     }
 }
 
