@@ -8,7 +8,7 @@ use crate::format::{self, Limits, STRIP};
 use crate::key::Nothing;
 use crate::lists::{CHART, FIELD};
 use crate::memory::{self, Workspace};
-use crate::record::{Place, Shape};
+use crate::record::{Place, SLICE_COST, Shape};
 use crate::span::{self, Test};
 use crate::timeline::Moment;
 use crate::{Bundle, MemoryError};
@@ -82,14 +82,11 @@ struct Coming<'a> {
     from: u32,
 }
 
-/// What a slice costs besides the bytes it reads, as so many bytes more: a row costs its time even where the record hardly says anything.
-const SLICE_COST: u64 = 32;
-
 impl Coming<'_> {
-    /// What is left to do, in bytes: those of the record are a fair measure of the time it takes.
+    /// What is left to do: bytes of the record, and [`SLICE_COST`] a slice.
     fn left(&self) -> u64 {
         let slices = self.slices.saturating_sub(self.done) as u64;
-        slices.saturating_mul(SLICE_COST).saturating_add(self.bits.left() as u64)
+        slices.saturating_mul(u64::from(SLICE_COST)).saturating_add(self.bits.left() as u64)
     }
 }
 
