@@ -158,10 +158,10 @@ impl<'a> Player<'a> {
 
     /// Makes `frame` the current frame; past the end it wraps on a looping bundle, else the last frame stays.
     ///
-    /// What the frame needs and is not there is decoded, at most [`Limits::seek_keys`] keys: backwards, or far ahead, from an
-    /// independent key on. Then the next key is decoded ahead, as much of it as of the interval has passed, so that playback that goes
-    /// on finds it there: each of an interval's n frames decodes an n-th of a key, none a whole one. A seek that has already decoded
-    /// as many keys as it may leaves the next one to the frames after it.
+    /// What the frame needs and is not there is decoded: backwards, or far ahead, from an independent key on. Then the key that comes
+    /// next is decoded ahead, as much of it as of the interval has passed, so that who plays on finds it there: in playback each of an
+    /// interval's n frames decodes an n-th of a key. That is at most [`Limits::seek_keys`] keys in all: a seek that has already
+    /// decoded as many leaves the coming key to the frames after it. A frame shown again decodes nothing.
     pub fn seek(&mut self, frame: Frame) {
         let frames = self.bundle.frames();
         let frame = if self.bundle.looping() { frame.0.checked_rem(frames).unwrap_or(0) } else { frame.0.min(frames.saturating_sub(1)) };
