@@ -71,6 +71,12 @@ impl<'a> Decoder<'a> {
         decoder
     }
 
+    /// Bytes that are not read yet.
+    #[must_use]
+    pub fn left(&self) -> usize {
+        self.bytes.len()
+    }
+
     fn next(&mut self) -> u32 {
         u32::from(self.bytes.next().copied().unwrap_or(0))
     }

@@ -199,7 +199,8 @@ pub struct Limits {
     pub cell_sheets: u8,
     /// Fields that a layer carries: 0 where no cell tests any, 2 where a tested label is a [`STRIP`].
     pub fields: u8,
-    /// Keys decoded by one seek: from an independent key up to the last one that the frame needs.
+    /// Keys decoded by one seek: from an independent key up to the last one that the frame needs. The player keeps to it with what it
+    /// decodes ahead counted in.
     pub seek_keys: u16,
 }
 

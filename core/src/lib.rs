@@ -9,7 +9,7 @@
 //! - [`Bundle::parse`] checks the bytes once; afterwards every accessor is total.
 //! - [`Bundle::memory_needed`] says how much working memory playback takes, before it starts.
 //! - [`Player::new`] takes that memory from the caller; [`Player::seek`] makes any frame the current one, decoding
-//!   at most [`format::Limits::seek_keys`] keys; [`Player::row`] renders one row of it.
+//!   at most [`format::Limits::seek_keys`] keys, and from frame to frame a part of one; [`Player::row`] renders one row of it.
 //!
 //! ```
 //! use cubist_core::{Bundle, Frame, MemoryError, Player};
@@ -59,11 +59,12 @@
 //! # How keys are read
 //!
 //! A key's **record** ([`record`]) is told from the one or two keys before it ([`coder`], [`nodes`]). An *independent* key is
-//! told from nothing; decoding starts there. Decoded keys live in a ring in the caller's memory: four for cubic time, the one
-//! before the interval, its two ends and the one after, else three; the sheet lists of the last three intervals in another. In
-//! playback the next key replaces the oldest. A seek to any other place decodes from the last independent key before it, unless
-//! going on from where the ring stands takes fewer keys. On a looping path the first key follows the last, so that the ring
-//! simply goes on.
+//! told from nothing; decoding starts there. Decoded keys live in a ring in the caller's memory: those that the interval needs (for
+//! cubic time the one before it, its two ends and the one after, else its two ends), and the next one, which is decoded while the
+//! interval plays: every frame does its share of it, some **slices**, so that none pays for a whole key. The sheet lists of the
+//! intervals that start at them are in another ring. In playback the next key is complete when it is needed, and the one after it takes
+//! the place of the oldest. A seek to any other place decodes from the last independent key before it, unless going on from where
+//! the ring stands takes fewer keys. On a looping path the first key follows the last, so that the ring simply goes on.
 //!
 //! # What holds
 //!

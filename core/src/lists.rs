@@ -133,57 +133,58 @@ impl Cursor {
     }
 }
 
-/// Codes the lists of an interval into `target`, given those of the interval before (or, at an
-/// independent key, after) it. `wanted` gives a cell's sheets to an encoder; a decoder's answer is ignored.
-pub fn code<B: Bits>(
+/// Codes the lists of one `row` of cells of an interval into `target`, which holds those of the rows above, given the lists of the
+/// interval before (or, at an independent key, after) it. `wanted` gives a cell's sheets to an encoder; a decoder's answer is ignored.
+#[expect(clippy::too_many_arguments, reason = "the coder, the lists' memory and the row's place are three different owners")]
+pub fn code_row<B: Bits>(
     bits: &mut B,
     contexts: &mut [Probability],
     grid: Grid,
     labels: usize,
     before: Option<&Lists<'_>>,
     target: &mut Lists<'_>,
+    row: usize,
     wanted: &mut impl FnMut(usize) -> Sheets,
 ) {
-    let mut end = 0;
-    let mut cell = 0usize;
     let mut coder = Coder { bits, contexts, labels };
-    for row in 0..grid.rows {
-        if let Some(start) = target.rows.get_mut(row) {
-            *start = end as u16;
-        }
-        let mut here = before.map_or(Cursor::NOWHERE, |lists| lists.row(row));
-        let mut below = before.map_or(Cursor::NOWHERE, |lists| lists.row(row.wrapping_add(1)));
-        let (mut west, mut north_west) = (Cursor::NOWHERE, Cursor::NOWHERE);
-        let mut north = row.checked_sub(1).map_or(Cursor::NOWHERE, |above| target.row_of(above));
-        for column in 0..grid.columns {
-            let last = column.wrapping_add(1) == grid.columns;
-            let north_east = if last { Cursor::NOWHERE } else { north.next(target) };
-            let sheets = {
-                let around = Around {
-                    near: [
-                        before.map_or_else(SheetsRef::default, |l| l.sheets(here)),
-                        target.sheets(west),
-                        target.sheets(north),
-                        target.sheets(north_east),
-                        target.sheets(north_west),
-                    ],
-                    far: [
-                        before.map_or_else(SheetsRef::default, |l| l.sheets(if last { Cursor::NOWHERE } else { here.next(l) })),
-                        before.map_or_else(SheetsRef::default, |l| l.sheets(below)),
-                    ],
-                };
-                coder.list(&around, &wanted(cell))
+    // The row above has left where it ends: what is coded needs no memory of its own from row to row.
+    let mut end = if row == 0 { 0 } else { target.rows.get(row).map_or(usize::MAX, |&at| usize::from(at)) };
+    if let Some(start) = target.rows.get_mut(row) {
+        *start = end as u16;
+    }
+    let mut here = before.map_or(Cursor::NOWHERE, |lists| lists.row(row));
+    let mut below = before.map_or(Cursor::NOWHERE, |lists| lists.row(row.wrapping_add(1)));
+    let (mut west, mut north_west) = (Cursor::NOWHERE, Cursor::NOWHERE);
+    let mut north = row.checked_sub(1).map_or(Cursor::NOWHERE, |above| target.row_of(above));
+    let mut cell = row.wrapping_mul(grid.columns);
+    for column in 0..grid.columns {
+        let last = column.wrapping_add(1) == grid.columns;
+        let north_east = if last { Cursor::NOWHERE } else { north.next(target) };
+        let sheets = {
+            let around = Around {
+                near: [
+                    before.map_or_else(SheetsRef::default, |l| l.sheets(here)),
+                    target.sheets(west),
+                    target.sheets(north),
+                    target.sheets(north_east),
+                    target.sheets(north_west),
+                ],
+                far: [
+                    before.map_or_else(SheetsRef::default, |l| l.sheets(if last { Cursor::NOWHERE } else { here.next(l) })),
+                    before.map_or_else(SheetsRef::default, |l| l.sheets(below)),
+                ],
             };
-            (west, north_west, north) = (Cursor { at: end }, north, north_east);
-            end = target.push(end, &sheets);
-            if let Some(lists) = before {
-                (here, below) = (here.next(lists), below.next(lists));
-            }
-            cell = cell.wrapping_add(1);
+            coder.list(&around, &wanted(cell))
+        };
+        (west, north_west, north) = (Cursor { at: end }, north, north_east);
+        end = target.push(end, &sheets);
+        if let Some(lists) = before {
+            (here, below) = (here.next(lists), below.next(lists));
         }
-        if let Some(start) = target.rows.get_mut(row.wrapping_add(1)) {
-            *start = end as u16;
-        }
+        cell = cell.wrapping_add(1);
+    }
+    if let Some(start) = target.rows.get_mut(row.wrapping_add(1)) {
+        *start = end as u16;
     }
 }
 

@@ -50,8 +50,8 @@ fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
     let (grid, limits) = (bundle.grid(), bundle.limits());
     let (key_layers, row_layers) = (usize::from(limits.key_layers), usize::from(limits.row_layers));
     let (back, ahead) = format::reach(bundle.path().time);
-    // Playing needs these; telling the next key needs the last two and itself.
-    let slots = back.saturating_add(ahead).saturating_add(1).max(3);
+    // Playing needs these, and the next key comes in meanwhile. (It is told from the last two: with it they are three at least.)
+    let slots = back.saturating_add(ahead).saturating_add(2);
     let fields = usize::from(limits.fields);
     let one_more = |count: usize| count.saturating_add(1);
     let cubic = bundle.path().space == SPACE_CUBIC;
@@ -83,9 +83,12 @@ fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
             }),
             slots,
             turn: 0,
-            lists: core::array::from_fn(|_| {
-                let (rows, data) = (cutter.take(one_more(grid.rows)), cutter.take(usize::from(limits.list_bytes)));
-                Lists::new(rows, data).at_most(limits.cell_sheets)
+            lists: core::array::from_fn(|slot| match slot < slots {
+                true => {
+                    let (rows, data) = (cutter.take(one_more(grid.rows)), cutter.take(usize::from(limits.list_bytes)));
+                    Lists::new(rows, data).at_most(limits.cell_sheets)
+                }
+                false => Lists::default(),
             }),
         },
         rows: core::array::from_fn(|row| node_row(cutter, cubic || row == 1 || row == 2, fields > 0)),

@@ -17,53 +17,54 @@ use heapless::Vec;
 /// Contexts a key is coded with: for positions, then for fields.
 pub const CONTEXTS: usize = predict::CONTEXTS + field::CONTEXTS;
 
-/// Codes one key's layers into `target`, in `contexts` ([`CONTEXTS`] of them). `traces` holds two rows of nodes' worth of [`Trace`]s,
-/// half of it each.
-pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
+/// Codes the layers of one `row` of a key's nodes into `target`, which holds those of the rows above, in `contexts` ([`CONTEXTS`] of
+/// them). `traces` holds two rows of nodes' worth of [`Trace`]s, half of it each.
+pub fn code_row<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
     bits: &mut B,
     contexts: &mut [Probability],
     setting: &Setting<'_, '_, L>,
     target: &mut Key<'_>,
     traces: &mut [Trace],
+    row: usize,
     source: &mut S,
 ) {
     let grid = setting.grid;
     let Some((positions, fields)) = contexts.split_at_mut_checked(predict::CONTEXTS) else { return };
-    let (mut node, mut layer) = (0usize, 0usize);
-    for row in 0..grid.node_rows() {
-        let mut around = Corner::new(setting.lists, row);
-        let row_start = layer;
-        for column in 0..grid.node_columns() {
-            if let Some(start) = target.start.get_mut(node) {
-                *start = layer as u16;
-            }
-            let mut labels: Vec<Found, MAX_NODE_LAYERS> = Vec::new();
-            around.labels(setting.lists, column < grid.columns, &mut labels);
-            let end = layer.wrapping_add(labels.len());
-            // A node that breaks the key's bound carries nothing.
-            let fits = end <= target.label.len() && end.wrapping_sub(row_start) <= traces.len() / 2;
-            if !fits {
-                labels.clear();
-            }
-            for (index, found) in (layer..).zip(&labels) {
-                if let Some(slot) = target.label.get_mut(index) {
-                    *slot = found.label;
-                }
-            }
-            if let Some(start) = target.start.get_mut(node.wrapping_add(1)) {
-                *start = layer.wrapping_add(labels.len()) as u16;
-            }
-            for found in &labels {
-                let spot = Spot { node, row, column, label: found.label, layer };
-                let coded = predict::code(bits, positions, setting, target, traces, &spot, found.support, source);
-                if let Some(slot) = target.uv.get_mut(layer) {
-                    *slot = coded.0;
-                }
-                field::code(bits, fields, setting, target, &spot, found.tested, source);
-                layer = layer.wrapping_add(1);
-            }
-            node = node.wrapping_add(1);
+    let mut node = row.wrapping_mul(grid.node_columns());
+    // The row above has left where it ends: what is coded needs no memory of its own from row to row.
+    let mut layer = if row == 0 { 0 } else { target.start.get(node).map_or(0, |&at| usize::from(at)) };
+    let mut around = Corner::new(setting.lists, row);
+    let row_start = layer;
+    for column in 0..grid.node_columns() {
+        if let Some(start) = target.start.get_mut(node) {
+            *start = layer as u16;
         }
+        let mut labels: Vec<Found, MAX_NODE_LAYERS> = Vec::new();
+        around.labels(setting.lists, column < grid.columns, &mut labels);
+        let end = layer.wrapping_add(labels.len());
+        // A node that breaks the key's bound carries nothing.
+        let fits = end <= target.label.len() && end.wrapping_sub(row_start) <= traces.len() / 2;
+        if !fits {
+            labels.clear();
+        }
+        for (index, found) in (layer..).zip(&labels) {
+            if let Some(slot) = target.label.get_mut(index) {
+                *slot = found.label;
+            }
+        }
+        if let Some(start) = target.start.get_mut(node.wrapping_add(1)) {
+            *start = layer.wrapping_add(labels.len()) as u16;
+        }
+        for found in &labels {
+            let spot = Spot { node, row, column, label: found.label, layer };
+            let coded = predict::code(bits, positions, setting, target, traces, &spot, found.support, source);
+            if let Some(slot) = target.uv.get_mut(layer) {
+                *slot = coded.0;
+            }
+            field::code(bits, fields, setting, target, &spot, found.tested, source);
+            layer = layer.wrapping_add(1);
+        }
+        node = node.wrapping_add(1);
     }
 }
 

@@ -7,7 +7,7 @@ use crate::format::{self, Limits, SPACE_CUBIC, STRIP};
 use crate::key::Nothing;
 use crate::lists::{CHART, FIELD};
 use crate::memory::{self, Workspace};
-use crate::record::Shape;
+use crate::record::{Place, SLICE_COST, Shape};
 use crate::row::Around;
 use crate::sheet::Part;
 use crate::span::{self, Test};
@@ -33,8 +33,12 @@ pub enum ByteOrder {
 /// Work done since the last `seek`, for figures and overlays.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Work {
-    /// Keys that the seek decoded.
+    /// Keys that the seek decoded whole, or whose last slice it decoded.
     pub keys: u32,
+    /// Slices of keys that it decoded: a slice is a row of nodes, or the lists of a few rows of cells.
+    pub slices: u32,
+    /// Bytes that it read of those keys' records.
+    pub record_bytes: u32,
     /// Layers interpolated in time.
     pub layers: u32,
     /// Layers worked out halfway between two rows of nodes.
@@ -66,6 +70,29 @@ struct Last {
     chain: usize,
 }
 
+/// A key that is being decoded.
+#[derive(Clone, Debug)]
+struct Coming<'a> {
+    run: u32,
+    place: Place,
+    bits: Decoder<'a>,
+    /// Slices of it, and how many of them are decoded.
+    slices: usize,
+    done: usize,
+    /// What there was to do in all, as [`Coming::left`] counts.
+    whole: u64,
+    /// Frames of the interval that have no share in it.
+    from: u32,
+}
+
+impl Coming<'_> {
+    /// What is left to do: bytes of the record, and [`SLICE_COST`] a slice.
+    fn left(&self) -> u64 {
+        let slices = self.slices.saturating_sub(self.done) as u64;
+        slices.saturating_mul(u64::from(SLICE_COST)).saturating_add(self.bits.left() as u64)
+    }
+}
+
 /// The keys that a moment needs.
 struct Needed {
     first: usize,
@@ -83,8 +110,10 @@ pub struct Player<'a> {
     space: Workspace<'a>,
     frame: Frame,
     moment: Moment,
-    /// The last key decoded.
+    /// The last key that the frame needed.
     last: Option<Last>,
+    /// The key after it, as far as it is decoded.
+    coming: Option<Coming<'a>>,
     /// The row of cells that `space.rows` and `space.sheets` hold.
     loaded: Option<usize>,
     work: Work,
@@ -103,7 +132,7 @@ impl<'a> Player<'a> {
         }
         let space = memory::workspace(bundle, memory).ok_or(too_small)?;
         let moment = bundle.moment(0);
-        let mut player = Self { bundle, space, frame: Frame(0), moment, last: None, loaded: None, work: Work::default() };
+        let mut player = Self { bundle, space, frame: Frame(0), moment, last: None, coming: None, loaded: None, work: Work::default() };
         player.set_byte_order(ByteOrder::Native);
         player.seek(Frame(0));
         Ok(player)
@@ -132,8 +161,10 @@ impl<'a> Player<'a> {
 
     /// Makes `frame` the current frame; past the end it wraps on a looping bundle, else the last frame stays.
     ///
-    /// Decodes at most [`Limits::seek_keys`] keys: none while the frame stays between the same two keys, one when it moves
-    /// on past the second (none where the path's end is near). Backwards, or far ahead, it starts at an independent key.
+    /// What the frame needs and is not there is decoded: backwards, or far ahead, from an independent key on. Then the key that comes
+    /// next is decoded ahead, as much of it as of the interval has passed, so that who plays on finds it there: in playback each of an
+    /// interval's n frames decodes an n-th of a key. That is at most [`Limits::seek_keys`] keys in all: a seek that has already
+    /// decoded as many leaves the coming key to the frames after it. A frame shown again decodes nothing.
     pub fn seek(&mut self, frame: Frame) {
         let frames = self.bundle.frames();
         let frame = if self.bundle.looping() { frame.0.checked_rem(frames).unwrap_or(0) } else { frame.0.min(frames.saturating_sub(1)) };
@@ -141,7 +172,6 @@ impl<'a> Player<'a> {
         self.loaded = None;
         self.frame = Frame(frame);
         self.moment = self.bundle.moment(frame);
-        let keys = self.bundle.key_count();
         let Needed { first, last, span, .. } = self.needed();
         // Either on from the last key, or from the independent key at or before the first one needed.
         let on = self.last.map(|state| (state, self.distance(state.key, last))).filter(|(state, on)| {
@@ -154,15 +184,21 @@ impl<'a> Player<'a> {
         let (mut key, count) = match on {
             Some((state, on)) if on <= anew => (state.key.saturating_add(1), on),
             _ => {
-                self.last = None;
+                (self.last, self.coming) = (None, None);
                 (start, anew)
             }
         };
         for _ in 0..count {
-            key = key.checked_rem(keys).unwrap_or(0);
-            self.decode(key);
+            key = self.wrapped(key);
+            self.finish(key);
             key = key.saturating_add(1);
         }
+        self.ahead(last);
+    }
+
+    /// `key` on the timeline: past the last one of a looping path comes the first.
+    fn wrapped(&self, key: usize) -> usize {
+        key.checked_rem(self.bundle.key_count()).unwrap_or(0)
     }
 
     /// The keys that the current moment needs.
@@ -295,22 +331,69 @@ impl<'a> Player<'a> {
         self.loaded = Some(row);
     }
 
-    /// Decodes `key`, which follows the last one decoded or is independent.
-    fn decode(&mut self, key: usize) {
+    /// Takes up `key`, which follows the last one or is independent, where it was left, or begins it.
+    fn take_up(&mut self, key: usize) -> Coming<'a> {
         let bundle = self.bundle;
-        let run = match self.last {
-            Some(last) if !bundle.key(key).independent => last.run.saturating_add(1),
-            _ => 0,
-        };
+        self.coming.take().unwrap_or_else(|| {
+            let run = match self.last {
+                Some(last) if !bundle.key(key).independent => last.run.saturating_add(1),
+                _ => 0,
+            };
+            let place = bundle.place(key, run);
+            let slices = place.slices(bundle.grid());
+            let coming = Coming { run, place, bits: Decoder::new(bundle.record(key)), slices, done: 0, whole: 0, from: 0 };
+            Coming { whole: coming.left(), ..coming }
+        })
+    }
+
+    /// Decodes what is missing of `key`, which becomes the last one.
+    fn finish(&mut self, key: usize) {
+        let mut coming = self.take_up(key);
+        self.decode(&mut coming, 0);
+        self.space.stream.finish();
+        self.last = Some(Last { key, run: coming.run, chain: self.last.map_or(0, |last| last.chain).saturating_add(1) });
+    }
+
+    /// Decodes the key after `last` as far as it is due at the current moment.
+    fn ahead(&mut self, last: usize) {
+        let (next, Moment { passed, length, .. }) = (self.wrapped(last.saturating_add(1)), self.moment);
+        // A path that ends has no key after its last one; on a loop of one key the next is the same.
+        if next == last || (next == 0 && !self.bundle.looping()) {
+            return;
+        }
+        let mut coming = self.take_up(next);
+        let frame = passed.saturating_add(1).min(length);
+        if self.work.keys < u32::from(self.bundle.limits().seek_keys) {
+            // Every frame has the same share, to the nearest slice; the last one does all that is left.
+            let (frames, shares) = (frame.saturating_sub(coming.from), length.saturating_sub(coming.from));
+            let due = coming.whole.saturating_mul(u64::from(frames)).checked_div(u64::from(shares)).unwrap_or(0);
+            let slice = coming.whole.checked_div(coming.slices as u64).unwrap_or(0);
+            let rounded = if frames < shares { due.saturating_sub(slice >> 1) } else { due };
+            let left = coming.whole.saturating_sub(rounded);
+            self.decode(&mut coming, left);
+        } else {
+            coming.from = coming.from.max(frame);
+        }
+        self.coming = Some(coming);
+    }
+
+    /// Decodes slices of `coming` until no more than `left` is left to do.
+    fn decode(&mut self, coming: &mut Coming<'a>, left: u64) {
+        let bundle = self.bundle;
         let shape = Shape {
             grid: bundle.grid(),
             labels: bundle.label_count(),
             label: |label| bundle.label(label),
             step_log2: u32::from(bundle.path().step_log2),
         };
-        self.space.stream.code(&mut Decoder::new(bundle.record(key)), shape, bundle.place(key, run), &mut Nothing);
-        self.last = Some(Last { key, run, chain: self.last.map_or(0, |last| last.chain).saturating_add(1) });
-        self.work.keys = self.work.keys.wrapping_add(1);
+        let bytes = coming.bits.left();
+        while coming.done < coming.slices && coming.left() > left {
+            self.space.stream.slice(&mut coming.bits, shape, coming.place, coming.done, &mut Nothing);
+            coming.done = coming.done.saturating_add(1);
+            self.work.slices = self.work.slices.wrapping_add(1);
+            self.work.keys = self.work.keys.wrapping_add(u32::from(coming.done == coming.slices));
+        }
+        self.work.record_bytes = self.work.record_bytes.wrapping_add(bytes.saturating_sub(coming.bits.left()) as u32);
     }
 }
 

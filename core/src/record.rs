@@ -1,6 +1,6 @@
 //! A key record: the sheet lists of the interval that starts at the key (an independent key repeats those of the one that
 //! ends there), then the key's layers.
-//! Described once: the player decodes records into the caller's memory, the baker's encoder makes them.
+//! Described once: the player decodes records into the caller's memory, whole or slice by slice, the baker's encoder makes them.
 
 use crate::coder::{Bits, Probability};
 use crate::format::LabelRecord;
@@ -9,10 +9,10 @@ use crate::key::{Key, Setting, Source};
 use crate::lists::{self, Lists};
 use crate::nodes::{self, Trace};
 
-/// Keys held at a time, at most: four to play a cubic interval. Three are held always: the last two tell the next.
-pub const MAX_KEYS: usize = 4;
-/// Sheet lists held at a time: those of the intervals from the one that plays to the one after the last key.
-pub const LISTS: usize = 3;
+/// Keys held at a time, at most: four to play a cubic interval, and the one that is being coded.
+pub const MAX_KEYS: usize = 5;
+/// Sheet lists held at a time, at most: those of the intervals from the one that plays to the one after the key being coded.
+pub const LISTS: usize = 4;
 
 /// Everything records are coded with and into.
 #[derive(Debug)]
@@ -23,11 +23,11 @@ pub struct Stream<'m> {
     pub key_contexts: &'m mut [Probability],
     /// Room for the layers of two rows of nodes: one trace each.
     pub traces: &'m mut [Trace],
-    /// The last keys, in a ring of the first `slots`.
+    /// The last keys and the one being coded, in a ring of the first `slots`.
     pub keys: [Key<'m>; MAX_KEYS],
-    /// The lists of the intervals that start at the last of them, in a ring too.
+    /// The lists of the intervals that start at them, in a ring of the first `slots` too, or of as many as there are.
     pub lists: [Lists<'m>; LISTS],
-    /// Keys in use: at least 3, at most [`MAX_KEYS`].
+    /// Keys in use: at least 3, the last two and the one that they tell; at most [`MAX_KEYS`].
     pub slots: usize,
     /// Records coded so far; it turns both rings.
     pub turn: usize,
@@ -61,8 +61,30 @@ pub struct Place {
     pub lengths: [u32; 2],
 }
 
+/// Rows of cells whose lists make a slice: about as much work as one row of nodes.
+const LIST_ROWS: usize = 4;
+/// The time a slice takes grows with the bytes it reads. It takes as long as for this many bytes more even where the record hardly says
+/// anything: so was it measured, for either kind of slice.
+pub const SLICE_COST: u32 = 32;
+
+impl Place {
+    /// Slices of a record at this place: a few rows of cells or one row of nodes each, about the same work.
+    #[must_use]
+    pub const fn slices(self, grid: Grid) -> usize {
+        let [after, before] = self.list_slices(grid);
+        after.saturating_add(before).saturating_add(grid.node_rows())
+    }
+
+    /// Slices of the lists of the interval after the key, and of the one before it.
+    const fn list_slices(self, grid: Grid) -> [usize; 2] {
+        let slices = grid.rows.div_ceil(LIST_ROWS);
+        // Who starts here has not seen the interval before, which the key's layers depend on too.
+        [if self.has_after { slices } else { 0 }, if self.independent && self.has_before { slices } else { 0 }]
+    }
+}
+
 impl<'m> Stream<'m> {
-    /// Codes the record at `place`, as the newest.
+    /// Codes the whole record at `place`, as the newest.
     pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord + Copy>(
         &mut self,
         bits: &mut B,
@@ -70,39 +92,67 @@ impl<'m> Stream<'m> {
         place: Place,
         source: &mut S,
     ) {
-        if place.independent {
+        for slice in 0..place.slices(shape.grid) {
+            self.slice(bits, shape, place, slice, source);
+        }
+        self.finish();
+    }
+
+    /// Codes one slice of the record at `place`, which follows the newest and replaces the oldest key held. All slices that
+    /// [`Place::slices`] counts have to be coded in order, from `bits` that go on where they stopped; then [`Stream::finish`] makes the
+    /// record the newest. Meanwhile the other keys held are there to be played.
+    pub fn slice<B: Bits, S: Source, L: Fn(u8) -> LabelRecord + Copy>(
+        &mut self,
+        bits: &mut B,
+        shape: Shape<L>,
+        place: Place,
+        slice: usize,
+        source: &mut S,
+    ) {
+        if slice == 0 && place.independent {
             self.list_contexts.fill(Probability::NEW);
             self.key_contexts.fill(Probability::NEW);
         }
-        self.turn = self.turn.wrapping_add(1);
-        let (now_slot, list_slot, list_before_slot) = (self.key_slot(0), self.list_slot(0), self.list_slot(1));
+        let next = self.turn.wrapping_add(1);
+        let (now_slot, list_slot, list_before_slot) = (self.key_slot(next), self.list_slot(next), self.list_slot(self.turn));
         let mut now = self.keys.get_mut(now_slot).map(core::mem::take).unwrap_or_default();
         let mut lists_after = self.lists.get_mut(list_slot).map(core::mem::take).unwrap_or_default();
         let mut lists_before = self.lists.get_mut(list_before_slot).map(core::mem::take).unwrap_or_default();
-        let mut code = |known: Option<&Lists<'_>>, target: &mut Lists<'_>, ahead: bool| {
-            lists::code(bits, self.list_contexts, shape.grid, shape.labels, known, target, &mut |cell| source.sheets(ahead, cell));
+        let mut code = |known: Option<&Lists<'_>>, target: &mut Lists<'_>, slice: usize, ahead: bool| {
+            let from = slice.wrapping_mul(LIST_ROWS);
+            let wanted = &mut |cell| source.sheets(ahead, cell);
+            for row in (from..shape.grid.rows).take(LIST_ROWS) {
+                lists::code_row(bits, self.list_contexts, shape.grid, shape.labels, known, target, row, wanted);
+            }
         };
-        if place.has_after {
-            code((!place.independent).then_some(&lists_before), &mut lists_after, true);
+        let [after, before] = place.list_slices(shape.grid);
+        if slice < after {
+            code((!place.independent).then_some(&lists_before), &mut lists_after, slice, true);
+        } else if let slice = slice.wrapping_sub(after)
+            && slice < before
+        {
+            code(place.has_after.then_some(&lists_after), &mut lists_before, slice, false);
+        } else {
+            let key_contexts = core::mem::take(&mut self.key_contexts);
+            let traces = core::mem::take(&mut self.traces);
+            let [length, length_before] = place.lengths;
+            let setting = Setting {
+                grid: shape.grid,
+                label: shape.label,
+                step_log2: shape.step_log2,
+                before: self.key(0).filter(|_| place.run >= 1),
+                before_that: self.key(1).filter(|_| place.run >= 2).map(|key| (key, ratio(length, length_before))),
+                lists: [place.has_before.then_some(&lists_before), place.has_after.then_some(&lists_after)],
+            };
+            nodes::code_row(bits, key_contexts, &setting, &mut now, traces, slice.wrapping_sub(after).wrapping_sub(before), source);
+            (self.key_contexts, self.traces) = (key_contexts, traces);
         }
-        if place.independent && place.has_before {
-            // Who starts here has not seen the interval before, which the key's layers depend on too.
-            code(place.has_after.then_some(&lists_after), &mut lists_before, false);
-        }
-        let key_contexts = core::mem::take(&mut self.key_contexts);
-        let traces = core::mem::take(&mut self.traces);
-        let [length, length_before] = place.lengths;
-        let setting = Setting {
-            grid: shape.grid,
-            label: shape.label,
-            step_log2: shape.step_log2,
-            before: self.key(1).filter(|_| place.run >= 1),
-            before_that: self.key(2).filter(|_| place.run >= 2).map(|key| (key, ratio(length, length_before))),
-            lists: [place.has_before.then_some(&lists_before), place.has_after.then_some(&lists_after)],
-        };
-        nodes::code(bits, key_contexts, &setting, &mut now, traces, source);
-        (self.key_contexts, self.traces) = (key_contexts, traces);
         self.put(now_slot, now, [(list_slot, lists_after), (list_before_slot, lists_before)]);
+    }
+
+    /// The record that was coded slice by slice is the newest from now on.
+    pub fn finish(&mut self) {
+        self.turn = self.turn.wrapping_add(1);
     }
 
     fn put(&mut self, slot: usize, key: Key<'m>, lists: [(usize, Lists<'m>); 2]) {
@@ -116,24 +166,24 @@ impl<'m> Stream<'m> {
         }
     }
 
-    fn key_slot(&self, age: usize) -> usize {
-        self.turn.wrapping_sub(age).checked_rem(self.slots).unwrap_or(0)
+    fn key_slot(&self, turn: usize) -> usize {
+        turn.checked_rem(self.slots).unwrap_or(0)
     }
 
-    fn list_slot(&self, age: usize) -> usize {
-        self.turn.wrapping_sub(age) % LISTS
+    fn list_slot(&self, turn: usize) -> usize {
+        turn.checked_rem(self.slots.min(LISTS)).unwrap_or(0)
     }
 
-    /// The key coded `age` records before the last; `None` where it is not held any more.
+    /// The key coded `age` records before the newest; `None` where it is not held any more, or the next one may stand there.
     #[must_use]
     pub fn key(&self, age: usize) -> Option<&Key<'m>> {
-        self.keys.get(self.key_slot(age)).filter(|_| age < self.slots)
+        self.keys.get(self.key_slot(self.turn.wrapping_sub(age))).filter(|_| age.wrapping_add(1) < self.slots)
     }
 
     /// The lists of the interval that starts at that key.
     #[must_use]
     pub fn lists(&self, age: usize) -> Option<&Lists<'m>> {
-        self.lists.get(self.list_slot(age)).filter(|_| age < LISTS)
+        self.lists.get(self.list_slot(self.turn.wrapping_sub(age))).filter(|_| age.wrapping_add(1) < self.slots.min(LISTS))
     }
 }
 

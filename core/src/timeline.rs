@@ -21,6 +21,10 @@ pub struct Moment {
     pub weights: WeightSet,
     /// How far it is to the end of the interval, Q14.
     pub linear: i32,
+    /// Frames since the start of the interval.
+    pub passed: u32,
+    /// Frames of the interval.
+    pub length: u32,
 }
 
 /// The weights `passed` frames into an interval of `lengths[1]` frames, between intervals of `lengths[0]` and `lengths[2]`
@@ -101,11 +105,12 @@ impl Bundle<'_> {
         let after = keys.partition_point(|bytes| KeyEntry::from_bytes(bytes).frame <= frame);
         let interval = after.saturating_sub(1).min(self.intervals().saturating_sub(1));
         let at = interval as isize;
-        let lengths = [self.interval_length(at.wrapping_sub(1)), self.interval_length(at), self.interval_length(at.wrapping_add(1))];
+        let length = self.interval_length(at);
+        let lengths = [self.interval_length(at.wrapping_sub(1)), length, self.interval_length(at.wrapping_add(1))];
         let passed = frame.saturating_sub(self.interval_start(interval));
         let time = self.path().time;
         let [[_, _, linear, _], ..] = weights(time.min(TIME_LINEAR), lengths, passed);
-        Moment { interval, weights: weights(time, lengths, passed), linear }
+        Moment { interval, weights: weights(time, lengths, passed), linear, passed, length }
     }
 
     /// The place of key `key`'s record, `run` records after the last independent one.

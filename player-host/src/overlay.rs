@@ -220,7 +220,7 @@ mod tests {
             fps: 30,
             bundle_bytes: 91_234,
             memory: 14_336,
-            work: Work { keys: 2, layers: 1234, smooth_pixels: 900, torn_pixels: 100, coverage_tests: 150 },
+            work: Work { keys: 2, layers: 1234, smooth_pixels: 900, torn_pixels: 100, coverage_tests: 150, ..Work::default() },
         }
     }
 
