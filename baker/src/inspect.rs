@@ -1,7 +1,6 @@
 //! Inspection: what a bundle holds, byte by section.
 //! Bytes come from a file or the encoder; figures go to `cubist-bake inspect` and to the report's byte counts.
 
-use cubist_core::fixed::KEY_BITS;
 use cubist_core::format::{ATLAS, FIXED, INFO, LABELS, MASK, MASKED, PATH, STRIP, TIME_HOLD, TIME_LINEAR, VERSION};
 use cubist_core::{Bundle, BundleError};
 use serde::Serialize;
@@ -191,7 +190,7 @@ impl Inspection {
                     TIME_LINEAR => "linear",
                     _ => "cubic",
                 },
-                steps_a_texel: (1 << KEY_BITS) >> path.step_log2,
+                steps_a_texel: (1 << path.key_bits) >> path.step_log2,
                 table_bytes: path.table.len(),
                 record_bytes: path.records.len(),
             },
@@ -324,7 +323,7 @@ fn label_info(bundle: &Bundle<'_>, label: u8) -> LabelInfo {
         masked: record.flags & MASKED != 0,
         strip: record.flags & STRIP != 0,
         fixed,
-        origin: fixed.then(|| [scaled(record.origin_u, KEY_BITS), scaled(record.origin_v, KEY_BITS)]),
+        origin: fixed.then(|| [record.origin_u, record.origin_v].map(|origin| scaled(origin, bundle.path().key_bits.into()))),
         step: fixed.then(|| [scaled(record.step_u, 14), scaled(record.step_v, 14)]),
     }
 }

@@ -3,9 +3,10 @@
 
 use crate::BundleError;
 use crate::atlas::Texture;
+use crate::fixed::KEY_BITS;
 use crate::format::{
     self, ATLAS, Atlas, Envelope, FIXED, INFO, KEY_BYTES, KNOWN_FLAGS, KeyEntry, LABEL_BYTES, LABELS, LabelRecord, MAGIC, MASK, MASKED,
-    MAX_SECTIONS, MAX_SHEETS, PATH, Path, Section, SPACE_CUBIC, TIME_CUBIC, VERSION,
+    MAX_SECTIONS, MAX_SHEETS, PATH, Path, SPACE_CUBIC, Section, TIME_CUBIC, VERSION,
 };
 use crate::grid::Grid;
 use heapless::Vec;
@@ -216,6 +217,7 @@ fn check_path<'a>(path: &Path<'a>) -> Result<&'a [[u8; KEY_BYTES]], BundleError>
     field((2..=5).contains(&path.cell_log2), "PATH cell_log2", u32::from(path.cell_log2))?;
     field(path.time <= TIME_CUBIC, "PATH time", u32::from(path.time))?;
     field(path.space <= SPACE_CUBIC, "PATH space", u32::from(path.space))?;
+    field(KEY_BITS.contains(&path.key_bits), "PATH key_bits", u32::from(path.key_bits))?;
     field(path.step_log2 <= 4, "PATH step_log2", u32::from(path.step_log2))?;
     field((1..=MAX_SHEETS as u8).contains(&path.limits.cell_sheets), "PATH cell_sheets", u32::from(path.limits.cell_sheets))?;
     field(path.limits.fields <= 2, "PATH fields", u32::from(path.limits.fields))?;

@@ -1,14 +1,14 @@
 //! Fixed-point numbers: how coordinates are stored in keys, how they are interpolated.
 //! Values come from `key`, weights from `timeline`; results go to `cell` and `span`.
 //!
-//! A number's unit goes with its place: stored positions count 1/32 texel, playback's are Q15.16 texels; time weights are Q14;
+//! A number's unit goes with its place: stored positions count 1/32 to 1/128 texel, as the bundle says, playback's are Q15.16 texels; time weights are Q14;
 //! a field is a code from -37 to 37 where it is stored, Q8 pixels in a key, Q16 pixels during playback.
 
-/// Fraction bits of a stored coordinate: 1/32 texel.
-pub const KEY_BITS: u32 = 5;
-/// The least stored coordinate, 1/32 texel: 512 texels outside the picture, because ghosts are extrapolated.
-pub const KEY_MIN: i32 = -512 << KEY_BITS;
-/// The largest stored coordinate, 1/32 texel: just below 1536 texels.
+/// Fraction bits that a stored coordinate can have: 5 reach from 512 texels outside the picture to 1536, each more halves that.
+pub const KEY_BITS: core::ops::RangeInclusive<u8> = 5..=7;
+/// The least stored coordinate: outside the picture, because ghosts are extrapolated.
+pub const KEY_MIN: i32 = -16_384;
+/// The largest stored coordinate.
 pub const KEY_MAX: i32 = KEY_MIN + 0xffff;
 /// Fraction bits of a time weight.
 pub const WEIGHT_BITS: u32 = 14;
@@ -17,25 +17,25 @@ pub const ONE: i32 = 1 << WEIGHT_BITS;
 /// Fraction bits of a coordinate during playback.
 pub const PLAY_BITS: u32 = 16;
 
-/// A stored position in the source image: u and v in 1/32 texel from [`KEY_MIN`] on, 16 bits each, v in the upper half.
+/// A stored position in the source image: u and v in stored units from [`KEY_MIN`] on, 16 bits each, v in the upper half.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct KeyUv(pub u32);
 
 impl KeyUv {
-    /// From u and v in 1/32 texel, clamped to the range there is.
+    /// From u and v in stored units, clamped to the range there is.
     #[must_use]
     pub fn new(u: i32, v: i32) -> Self {
         let stored = |x: i32| x.clamp(KEY_MIN, KEY_MAX).wrapping_sub(KEY_MIN) as u32;
         Self(stored(v) << 16 | stored(u))
     }
 
-    /// u in 1/32 texel, [`KEY_MIN`]..=[`KEY_MAX`].
+    /// u in stored units, [`KEY_MIN`]..=[`KEY_MAX`].
     #[must_use]
     pub const fn u(self) -> i32 {
         ((self.0 & 0xffff) as i32).wrapping_add(KEY_MIN)
     }
 
-    /// v in 1/32 texel, [`KEY_MIN`]..=[`KEY_MAX`].
+    /// v in stored units, [`KEY_MIN`]..=[`KEY_MAX`].
     #[must_use]
     pub const fn v(self) -> i32 {
         ((self.0 >> 16) as i32).wrapping_add(KEY_MIN)
@@ -51,16 +51,16 @@ pub struct PlayUv {
     pub v: i32,
 }
 
-/// The sum of `values` (1/32 texel) times `weights` (Q14, summing to [`ONE`]), in Q15.16, rounded to nearest, ties up;
-/// exact where one weight is [`ONE`].
+/// The sum of `values` (with `bits` fraction bits, one of [`KEY_BITS`]) times `weights` (Q14, summing to [`ONE`]), in Q15.16, rounded to
+/// nearest, ties up; exact where one weight is [`ONE`].
 #[must_use]
 #[expect(
     clippy::arithmetic_side_effects,
     reason = "the weights' magnitudes sum to at most 1.6 and values are below 1.5 * 2^15: no partial sum reaches 1.2 * 2^30 in size"
 )]
-pub const fn blend([a, b, c, d]: [i32; 4], [e, f, g, h]: [i32; 4]) -> i32 {
-    const DROP: u32 = KEY_BITS + WEIGHT_BITS - PLAY_BITS;
-    (a * e + b * f + c * g + d * h + (1 << (DROP - 1))) >> DROP
+pub const fn blend([a, b, c, d]: [i32; 4], [e, f, g, h]: [i32; 4], bits: u32) -> i32 {
+    let drop = (bits & 7) + WEIGHT_BITS - PLAY_BITS;
+    (a * e + b * f + c * g + d * h + (1 << drop >> 1)) >> drop
 }
 
 /// The value `step` / 2^`log2` of the way from `from` to `to`, rounded down; exact at both ends.
@@ -127,9 +127,12 @@ mod tests {
 
     #[test]
     fn blend_is_exact_at_the_keys_and_keeps_constants() {
-        assert_eq!(blend([1, KEY_MAX, 3, 4], [0, ONE, 0, 0]), KEY_MAX << 11);
-        assert_eq!(blend([1, 2, KEY_MIN, 4], [0, 0, ONE, 0]), KEY_MIN << 11);
-        assert_eq!(blend([1234; 4], [-700, ONE - 300, 1700, -700]), 1234 << 11);
+        for bits in KEY_BITS.map(u32::from) {
+            let scale = PLAY_BITS - bits;
+            assert_eq!(blend([1, KEY_MAX, 3, 4], [0, ONE, 0, 0], bits), KEY_MAX << scale);
+            assert_eq!(blend([1, 2, KEY_MIN, 4], [0, 0, ONE, 0], bits), KEY_MIN << scale);
+            assert_eq!(blend([1234; 4], [-700, ONE - 300, 1700, -700], bits), 1234 << scale);
+        }
     }
 
     #[test]

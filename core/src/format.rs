@@ -91,9 +91,9 @@ pub struct LabelRecord {
     pub flags: u8,
     /// Room for a tint; 0: none.
     pub tint: [u8; 3],
-    /// [`FIXED`] labels: u at the leftmost nodes, which stand at pixel centres, 1/32 texel.
+    /// [`FIXED`] labels: u at the leftmost nodes, which stand at pixel centres, stored units.
     pub origin_u: u16,
-    /// [`FIXED`] labels: v at the topmost nodes, 1/32 texel.
+    /// [`FIXED`] labels: v at the topmost nodes, stored units.
     pub origin_v: u16,
     /// [`FIXED`] labels: u a pixel to the right, 1/16384 texel.
     pub step_u: u16,
@@ -173,7 +173,9 @@ pub struct Path<'a> {
     pub time: u8,
     /// [`SPACE_LINEAR`] or [`SPACE_CUBIC`].
     pub space: u8,
-    /// Coordinates are coded in steps of 2^this / 32 texel, 0..=4.
+    /// Fraction bits of coordinates, one of [`crate::fixed::KEY_BITS`].
+    pub key_bits: u8,
+    /// Coordinates are coded in steps of 2^this of their units, 0..=4.
     pub step_log2: u8,
     /// The bounds that memory and work follow from.
     pub limits: Limits,

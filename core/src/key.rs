@@ -49,7 +49,7 @@ impl Key<'_> {
         [distance(a), distance(b)]
     }
 
-    /// u and v of the layer of `label` at `node`, 1/32 texel.
+    /// u and v of the layer of `label` at `node`, stored units.
     pub(crate) fn position(&self, node: usize, label: u8) -> Option<[i32; 2]> {
         self.find(node, label).map(|index| self.uv(index)).map(|uv| [uv.u(), uv.v()])
     }
@@ -61,7 +61,7 @@ pub trait Source {
     fn sheets(&mut self, ahead: bool, cell: usize) -> Sheets;
 
     /// The residual to code, in steps along u and v, for the layer of `label` at `node` whose `predicted` position is in
-    /// 1/32 texel. `contexts` tell what residuals cost.
+    /// stored units. `contexts` tell what residuals cost.
     fn residual(&mut self, node: usize, label: u8, predicted: [i32; 2], contexts: [&[Probability]; 2]) -> [i32; 2];
 
     /// The code of field `which` for the layer of `label` at `node`.
@@ -93,7 +93,9 @@ pub struct Setting<'s, 'm, L> {
     pub grid: Grid,
     /// The record of a label.
     pub label: L,
-    /// Coordinates are coded in steps of 2^this / 32 texel.
+    /// Fraction bits of coordinates.
+    pub key_bits: u32,
+    /// Coordinates are coded in steps of 2^this of their units.
     pub step_log2: u32,
     /// The key before, unless this one is independent.
     pub before: Option<&'s Key<'m>>,

@@ -301,6 +301,7 @@ impl<'a> Player<'a> {
             // A path of one key has nothing to move on to.
             to: at(1).unwrap_or(start),
             after: at(2).filter(|_| cubic_time),
+            key_bits: u32::from(bundle.path().key_bits),
         };
         let cubic = bundle.path().space == SPACE_CUBIC;
         // Going down, the rows of nodes around the last row of cells are those around this one, but for the lowest.
@@ -384,6 +385,7 @@ impl<'a> Player<'a> {
             grid: bundle.grid(),
             labels: bundle.label_count(),
             label: |label| bundle.label(label),
+            key_bits: u32::from(bundle.path().key_bits),
             step_log2: u32::from(bundle.path().step_log2),
         };
         let bytes = coming.bits.left();

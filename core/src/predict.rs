@@ -6,7 +6,7 @@
 //! contexts of the residual.
 
 use crate::coder::{self, Bits, NUMBER_CONTEXTS, Probability};
-use crate::fixed::{KEY_BITS, KEY_MAX, KEY_MIN, KeyUv};
+use crate::fixed::{KEY_MAX, KEY_MIN, KeyUv};
 use crate::format::{FIXED, LabelRecord};
 use crate::grid::Grid;
 use crate::key::{Key, Setting, Source, Spot};
@@ -35,11 +35,11 @@ pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
 ) -> KeyUv {
     let record = (setting.label)(spot.label);
     if record.flags & FIXED != 0 {
-        return fixed(&record, spot, setting.grid.log2);
+        return fixed(&record, spot, setting.grid.log2, setting.key_bits);
     }
     let neighbours = Neighbours::new(setting.grid, key, traces, spot);
     let candidates = Candidates::new(setting, &neighbours, spot);
-    let (predicted, noise) = candidates.choose(&neighbours, &record);
+    let (predicted, noise) = candidates.choose(&neighbours, &record, setting.key_bits);
     let round = |x: i32| {
         let half = (1i32 << setting.step_log2) >> 1;
         (x.clamp(KEY_MIN, KEY_MAX).wrapping_add(half)) >> setting.step_log2 << setting.step_log2
@@ -80,10 +80,10 @@ pub struct Trace {
 }
 
 /// The position of a screen-fixed layer at a node: an affine function of the screen position.
-fn fixed(record: &LabelRecord, spot: &Spot, log2: u32) -> KeyUv {
+fn fixed(record: &LabelRecord, spot: &Spot, log2: u32, key_bits: u32) -> KeyUv {
     let along = |origin: u16, step: u16, index: usize| {
         // index << log2 <= 4096 + 32 pixels, step < 2^16 of 1/16384 texel: the product fits 2^29.
-        let offset = (index as i32).wrapping_shl(log2).wrapping_mul(i32::from(step)) >> (14 - KEY_BITS);
+        let offset = (index as i32).wrapping_shl(log2).wrapping_mul(i32::from(step)) >> 14u32.wrapping_sub(key_bits);
         i32::from(origin).wrapping_add(offset)
     };
     KeyUv::new(along(record.origin_u, record.step_u, spot.column), along(record.origin_v, record.step_v, spot.row))
@@ -195,7 +195,7 @@ impl Candidates {
     }
 
     /// The candidate that was best at the neighbours, and the class of how noisy they were.
-    fn choose(&self, around: &Neighbours, record: &LabelRecord) -> ([i32; 2], usize) {
+    fn choose(&self, around: &Neighbours, record: &LabelRecord, key_bits: u32) -> ([i32; 2], usize) {
         let mut best: Option<(u32, [i32; 2])> = None;
         for (index, candidate) in self.uv.iter().enumerate() {
             let Some(candidate) = candidate else { continue };
@@ -210,7 +210,7 @@ impl Candidates {
             Some(twice) => [1, 2, 4, 8, 14, 26, 60].iter().take_while(|&&limit| twice >= limit).count(),
         };
         let centre = || {
-            let middle = |a: u16, b: u16| i32::from(a).wrapping_add(i32::from(b)).wrapping_shl(KEY_BITS) >> 1;
+            let middle = |a: u16, b: u16| i32::from(a).wrapping_add(i32::from(b)).wrapping_shl(key_bits) >> 1;
             [middle(record.left, record.right), middle(record.top, record.bottom)]
         };
         (best.map_or_else(centre, |(_, uv)| uv), class)

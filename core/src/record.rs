@@ -42,7 +42,9 @@ pub struct Shape<L> {
     pub labels: usize,
     /// The record of a label.
     pub label: L,
-    /// Coordinates are coded in steps of 2^this / 32 texel.
+    /// Fraction bits of coordinates.
+    pub key_bits: u32,
+    /// Coordinates are coded in steps of 2^this of their units.
     pub step_log2: u32,
 }
 
@@ -139,6 +141,7 @@ impl<'m> Stream<'m> {
             let setting = Setting {
                 grid: shape.grid,
                 label: shape.label,
+                key_bits: shape.key_bits,
                 step_log2: shape.step_log2,
                 before: self.key(0).filter(|_| place.run >= 1),
                 before_that: self.key(1).filter(|_| place.run >= 2).map(|key| (key, ratio(length, length_before))),

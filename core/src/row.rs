@@ -40,6 +40,8 @@ pub struct Around<'k, 'm> {
     pub to: &'k Key<'m>,
     /// The key after it.
     pub after: Option<&'k Key<'m>>,
+    /// Fraction bits of coordinates in keys.
+    pub key_bits: u32,
 }
 
 impl Around<'_, '_> {
@@ -55,7 +57,7 @@ impl Around<'_, '_> {
             (None, None) => neither,
         };
         let four = [before.unwrap_or_default(), self.from.uv(from), self.to.uv(to), after.unwrap_or_default()];
-        PlayUv { u: blend(four.map(KeyUv::u), *weights), v: blend(four.map(KeyUv::v), *weights) }
+        PlayUv { u: blend(four.map(KeyUv::u), *weights, self.key_bits), v: blend(four.map(KeyUv::v), *weights, self.key_bits) }
     }
 
     /// The fields of a layer, straight between the interval's keys, Q8 pixels.
@@ -121,12 +123,8 @@ impl NodeRow<'_> {
             for &label in labels {
                 if let Some(below) = to.find(column, label) {
                     let (first, last) = (before.find(column, label), after.find(column, label));
-                    let layer = Layer::middle(
-                        first.map(|at| before.layer(at)),
-                        from.layer(index),
-                        to.layer(below),
-                        last.map(|at| after.layer(at)),
-                    );
+                    let layer =
+                        Layer::middle(first.map(|at| before.layer(at)), from.layer(index), to.layer(below), last.map(|at| after.layer(at)));
                     // Fields are straight from node to node: nothing asks for them here.
                     count = self.put(count, label, layer, || [0; 2]);
                 }

@@ -90,8 +90,7 @@ impl RowSheets<'_> {
             let before = column.checked_sub(1).and_then(|column| row.find(column, label));
             let after = row.find(column.wrapping_add(2), label);
             if let Some(slot) = self.middle.get_mut(index).and_then(|middles| middles.get_mut(place)) {
-                *slot =
-                    Layer::middle(before.map(|at| row.layer(at)), row.layer(from), row.layer(to), after.map(|at| row.layer(at)));
+                *slot = Layer::middle(before.map(|at| row.layer(at)), row.layer(from), row.layer(to), after.map(|at| row.layer(at)));
             }
         }
     }
@@ -133,11 +132,8 @@ impl Part<'_, '_> {
         let log2 = self.log2.wrapping_sub(1);
         let (lower, step) = (self.step >> log2 != 0, self.step & (1u32 << log2).wrapping_sub(1));
         let outer = |[above, between, below]: [u16; 3]| {
-            let (above, below) = if lower {
-                (halfway.layer(between), bottom.layer(below))
-            } else {
-                (top.layer(above), halfway.layer(between))
-            };
+            let (above, below) =
+                if lower { (halfway.layer(between), bottom.layer(below)) } else { (top.layer(above), halfway.layer(between)) };
             down(above, below, step, log2)
         };
         let [above, between, below] = self.sheets.middle.get(index).copied().unwrap_or_default();

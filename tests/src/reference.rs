@@ -15,8 +15,6 @@ use cubist_core::timeline;
 
 /// The last position inside the source image is this far from its right and its lower edge, texels.
 const EDGE: f64 = 1.0 / 65_536.0;
-/// Stored coordinates count in this part of a texel.
-const STORED: f64 = 1.0 / 32.0;
 /// Stored distances count in this part of a pixel.
 const DISTANCE: f64 = 1.0 / 256.0;
 
@@ -124,14 +122,20 @@ impl<'a> Reference<'a> {
             slots: MAX_KEYS,
             turn: 0,
         };
-        let shape = Shape { grid, labels: bundle.label_count(), label: |label| bundle.label(label), step_log2: u32::from(path.step_log2) };
+        let shape = Shape {
+            grid,
+            labels: bundle.label_count(),
+            label: |label| bundle.label(label),
+            key_bits: u32::from(path.key_bits),
+            step_log2: u32::from(path.step_log2),
+        };
         let mask = bundle.sections().find(|section| section.tag == MASK).map_or(&[][..], |section| section.bytes);
         let mut reference = Self { bundle, grid, keys: Vec::new(), lists: Vec::new(), mask };
         let mut run = 0;
         for key in 0..bundle.key_count() {
             run = if bundle.key(key).independent { 0 } else { run + 1 };
             stream.code(&mut Decoder::new(bundle.record(key)), shape, bundle.place(key, run), &mut Nothing);
-            reference.keys.extend(stream.key(0).map(|key| nodes(key, grid)));
+            reference.keys.extend(stream.key(0).map(|key| nodes(key, grid, path.key_bits)));
             reference.lists.extend(stream.lists(0).map(|lists| cells(lists, grid)));
         }
         reference
@@ -355,10 +359,11 @@ fn bilinear([a, b, c, d]: &[[f64; 2]; 4], [x, y]: [f64; 2]) -> [f64; 2] {
 }
 
 /// The layers of every node of a key.
-fn nodes(key: &Key<'_>, grid: Grid) -> Vec<Vec<Layer>> {
+fn nodes(key: &Key<'_>, grid: Grid, key_bits: u8) -> Vec<Vec<Layer>> {
+    let stored = 1.0 / f64::from(1u32 << key_bits);
     let layer = |index: usize, label: u8| Layer {
         label,
-        at: [key.uv(index).u(), key.uv(index).v()].map(|x| f64::from(x) * STORED),
+        at: [key.uv(index).u(), key.uv(index).v()].map(|x| f64::from(x) * stored),
         fields: key.field(index).map(|distance| f64::from(distance) * DISTANCE),
     };
     (0..grid.nodes())

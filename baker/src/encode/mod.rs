@@ -10,7 +10,7 @@ use crate::fit::Fit;
 use crate::gbuffer::GBuffer;
 use crate::sheets::{KeyGrid, Layers, Sheets};
 use cubist_core::coder::Probability;
-use cubist_core::fixed::{KEY_BITS, KEY_MAX, KEY_MIN, field_code};
+use cubist_core::fixed::{KEY_MAX, KEY_MIN, field_code};
 use cubist_core::format::{
     ATLAS, Atlas, Envelope, FIXED, INFO, KeyEntry, LABELS, LabelRecord, Limits, MAGIC, MASK, MASKED, PATH, Path, STRIP, Section, VERSION,
 };
@@ -24,7 +24,7 @@ use range::Encoder;
 /// How keys are coded.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CodingSettings {
-    /// Coordinates are stored in steps of 2^this / 32 texel.
+    /// Coordinates are stored in steps of 2^this of their units: 1/64 texel, 1/32 where the picture is wider or higher than 512 texels.
     pub step_log2: u8,
     /// What a bit is worth, in squared texels of error summed over pixels, when residuals of ghosts are
     /// rounded towards zero; 0 keeps them all.
@@ -67,7 +67,8 @@ pub struct Content<'a> {
 /// [`Exceeded`] where a key or an interval holds more than the bundle's bounds can say.
 pub fn bundle(content: &Content<'_>, settings: CodingSettings, header: Header<'_>) -> Result<Vec<u8>, Exceeded> {
     let &Content { gbuffer, grid, image, .. } = content;
-    let mut labels: Vec<LabelRecord> = image.labels.iter().map(label_record).collect();
+    let key_bits = key_bits(image);
+    let mut labels: Vec<LabelRecord> = image.labels.iter().map(|label| label_record(label, key_bits)).collect();
     for (record, &strip) in labels.iter_mut().zip(&content.fields.strip) {
         record.flags |= if strip { STRIP } else { 0 };
     }
@@ -82,6 +83,7 @@ pub fn bundle(content: &Content<'_>, settings: CodingSettings, header: Header<'_
         cell_log2: grid.grid.log2 as u8,
         time: grid.time,
         space: grid.space,
+        key_bits,
         step_log2: settings.step_log2,
         limits: bounds,
         table: &table,
@@ -129,7 +131,12 @@ fn bits(flags: &[bool]) -> u8 {
     flags.iter().enumerate().fold(0, |byte, (at, &flag)| byte | u8::from(flag) << at)
 }
 
-fn label_record(label: &crate::atlas::Label) -> LabelRecord {
+/// Fraction bits of coordinates: the finest that leave as much room beside the picture as it is wide, half of it on either side.
+fn key_bits(image: &SourceImage) -> u8 {
+    if image.width.max(image.height) <= 512 { 6 } else { 5 }
+}
+
+fn label_record(label: &crate::atlas::Label, key_bits: u8) -> LabelRecord {
     let [left, top, right, bottom] = label.rect;
     let scaled = |value: f64, bits: u32| libm::round(value * f64::from(1u32 << bits)).clamp(0.0, 65_535.0) as u16;
     let mut record = LabelRecord { left, top, right, bottom, flags: if label.masked { MASKED } else { 0 }, ..LabelRecord::default() };
@@ -137,7 +144,7 @@ fn label_record(label: &crate::atlas::Label) -> LabelRecord {
         record.flags = FIXED;
         // Nodes stand at pixel centres.
         let [u, v] = [0, 1].map(|axis| f64::from(fixed.origin[axis]) + 0.5 * f64::from(fixed.step[axis]));
-        (record.origin_u, record.origin_v) = (scaled(u, KEY_BITS), scaled(v, KEY_BITS));
+        (record.origin_u, record.origin_v) = (scaled(u, key_bits.into()), scaled(v, key_bits.into()));
         (record.step_u, record.step_v) = (scaled(f64::from(fixed.step[0]), 14), scaled(f64::from(fixed.step[1]), 14));
     }
     record
@@ -152,6 +159,7 @@ fn keys(content: &Content<'_>, labels: &[LabelRecord], settings: CodingSettings,
         grid: grid.grid,
         labels: labels.len(),
         label: |label: u8| labels.get(usize::from(label)).copied().unwrap_or_default(),
+        key_bits: u32::from(key_bits(content.image)),
         step_log2: u32::from(settings.step_log2),
     };
     let (mut table, mut records) = (Vec::new(), Vec::new());
@@ -246,7 +254,7 @@ impl Source for Wanted<'_> {
 
     fn residual(&mut self, node: usize, label: u8, predicted: [i32; 2], contexts: [&[Probability]; 2]) -> [i32; 2] {
         let Some(layer) = self.content.layers.find(self.key * self.content.grid.grid.nodes() + node, label) else { return [0, 0] };
-        let unit = (1u32 << KEY_BITS) as f32;
+        let unit = (1u32 << key_bits(self.content.image)) as f32;
         let step = (1u32 << self.settings.step_log2) as f32 / unit;
         let free = self.settings.lambda > 0.0 && !self.visible(node, label);
         let mut residual = [0, 0];
