@@ -4,7 +4,8 @@
 use crate::atlas::{self, Atlas, AtlasError, SourceImage};
 use crate::encode::{self, CodingSettings, Content};
 use crate::folds::{self, Folded};
-use crate::gbuffer::Hits;
+use crate::gbuffer::{Hits, Lens};
+use crate::planes::{self, FlatChart};
 use crate::scene::Scene;
 use crate::sheets::{self, KeyGrid, Layers};
 use crate::trace::Tracer;
@@ -107,6 +108,8 @@ pub struct Flat {
     pub atlas: Atlas,
     /// Where the G-buffer's charts hide parts of themselves (see [`tears`]).
     pub tears: Vec<u8>,
+    /// The flat ones among the labels.
+    pub planes: Vec<Option<FlatChart>>,
     /// Rays cast.
     pub rays: u64,
     /// Seconds the rays took.
@@ -142,7 +145,8 @@ pub fn flatten(scene: &Scene, settings: &atlas::Settings, progress: Progress<'_>
     let atlas = atlas::build(scene, &hits, settings, &|done, total| progress("flattening surfaces", part(done, total)))?;
     progress("looking for tears", 0.0);
     let tears = tears::find(scene, &tracer, &hits, &atlas.gbuffer);
-    Ok(Flat { tears, rays: hits.samples.len() as u64, atlas, ray_seconds, atlas_seconds: start.elapsed().as_secs_f64() })
+    let planes = planes::find(scene, &hits, &atlas.gbuffer, atlas.image.labels.len());
+    Ok(Flat { tears, planes, rays: hits.samples.len() as u64, atlas, ray_seconds, atlas_seconds: start.elapsed().as_secs_f64() })
 }
 
 /// Fits and codes the keys, and puts the bundle together.
@@ -164,7 +168,7 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let volume = settings.cell * settings.cell * settings.key_interval;
     let least = if volume < 512 { settings.least_pixels.min(volume / 64).max(1) } else { settings.least_pixels };
     progress("finding sheets", 0.0);
-    let Folded { gbuffer, labels } = folds::unfold(gbuffer, &flat.tears, &grid, &image.labels, least.saturating_mul(2));
+    let Folded { gbuffer, labels, stands_for } = folds::unfold(gbuffer, &flat.tears, &grid, &image.labels, least.saturating_mul(2));
     let (gbuffer, image) = (&gbuffer, &SourceImage { labels, ..image.clone() });
     let mut sheets = sheets::find(gbuffer, &grid, least);
     let layers = Layers::of(&grid, &sheets);
@@ -180,7 +184,20 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     order::sort(&evidence, &mut sheets);
     progress("coding keys", 0.8);
     let header = encode::Header { fps: scene.playback.fps, info: &scene.name };
-    let content = Content { gbuffer, grid: &grid, image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields };
+    let charts: Vec<Option<FlatChart>> = stands_for.iter().map(|&label| flat.planes[usize::from(label)]).collect();
+    let lenses: Vec<Lens> = grid.keys.iter().map(|&frame| Lens::new(scene, frame)).collect();
+    let (planes, cameras) = planes::records(&charts, &layers.by_label(image.labels.len()), &lenses, &grid);
+    let content = Content {
+        gbuffer,
+        grid: &grid,
+        image,
+        sheets: &sheets,
+        layers: &layers,
+        fit: &fit,
+        fields: &fields,
+        planes: &planes,
+        cameras: &cameras,
+    };
     let bundle = encode::bundle(&content, settings.coding, header)?;
     progress("coding keys", 1.0);
     Ok(Encoded { bundle, grid, dropped_pixels: sheets.dropped, seconds: start.elapsed().as_secs_f64() })

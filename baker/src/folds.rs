@@ -23,13 +23,15 @@ pub struct Folded {
     pub gbuffer: GBuffer,
     /// The labels, aliases after the others.
     pub labels: Vec<Label>,
+    /// The label that each stands for: itself, but for aliases.
+    pub stands_for: Vec<u16>,
 }
 
 /// Tells the torn parts apart. Parts of fewer than `least` pixels in a cell and interval are given up.
 #[must_use]
 pub fn unfold(gbuffer: &GBuffer, tears: &[u8], grid: &KeyGrid, labels: &[Label], least: u32) -> Folded {
     let parts = Parts::find(gbuffer, tears, grid, least);
-    let mut folded = Folded { gbuffer: gbuffer.clone(), labels: labels.to_vec() };
+    let mut folded = Folded { gbuffer: gbuffer.clone(), labels: labels.to_vec(), stands_for: (0..labels.len() as u16).collect() };
     let Some(part) = parts.assign(gbuffer, tears, grid) else { return folded };
     // The largest parts get a label first.
     let mut sizes = vec![[0u64; PARTS]; labels.len()];
@@ -47,6 +49,7 @@ pub fn unfold(gbuffer: &GBuffer, tears: &[u8], grid: &KeyGrid, labels: &[Label],
     for &(_, label, part) in wanted.iter().take(MOST_LABELS.saturating_sub(labels.len())) {
         alias[label][part] = folded.labels.len() as u16;
         folded.labels.push(labels[label].clone());
+        folded.stands_for.push(label as u16);
     }
     folded.gbuffer.label.par_iter_mut().zip(part).for_each(|(label, part)| {
         *label = if usize::from(part) < PARTS { alias[usize::from(*label)][usize::from(part)] } else { NONE };

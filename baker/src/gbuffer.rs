@@ -80,6 +80,15 @@ pub struct Sample {
     pub c: f32,
 }
 
+impl Sample {
+    /// The point that is hit; the sample is not [`BACKGROUND`].
+    #[must_use]
+    pub fn point(&self, scene: &Scene) -> DVec3 {
+        let [a, b, c] = scene.triangles[(self.surface / 2) as usize].position;
+        a + (b - a) * f64::from(self.b) + (c - a) * f64::from(self.c)
+    }
+}
+
 /// One [`Sample`] at the centre of every pixel of every frame.
 pub struct Hits {
     /// Pixels a row.

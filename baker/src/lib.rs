@@ -18,6 +18,7 @@ pub mod job;
 pub mod metrics;
 pub mod order;
 pub mod patch;
+pub mod planes;
 pub mod report;
 pub mod scene;
 pub mod shade;

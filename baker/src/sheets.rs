@@ -216,6 +216,16 @@ impl Layers {
         layers
     }
 
+    /// How many layers each of `labels` labels has.
+    #[must_use]
+    pub fn by_label(&self, labels: usize) -> Vec<usize> {
+        let mut counts = vec![0; labels];
+        for &label in &self.label {
+            counts[usize::from(label)] += 1;
+        }
+        counts
+    }
+
     /// The index of the layer of `label` at `key_node`: the key times the nodes of the grid, plus the node.
     #[must_use]
     pub fn find(&self, key_node: usize, label: u8) -> Option<usize> {

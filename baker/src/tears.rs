@@ -97,7 +97,6 @@ impl Pair<'_> {
     /// The point that a sample sees, and its face's unit normal.
     fn point(&self, sample: Sample) -> (DVec3, DVec3) {
         let [a, b, c] = self.scene.triangles[(sample.surface / 2) as usize].position;
-        let point = a + (b - a) * f64::from(sample.b) + (c - a) * f64::from(sample.c);
-        (point, (b - a).cross(c - a).normalize_or_zero())
+        (sample.point(self.scene), (b - a).cross(c - a).normalize_or_zero())
     }
 }

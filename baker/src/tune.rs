@@ -8,10 +8,10 @@ use crate::gbuffer::Hits;
 use crate::job::{self, Chosen, Goal, Options};
 use crate::metrics;
 use crate::scene::Scene;
-use crate::tears;
 use crate::trace::Tracer;
 use crate::truth::Truth;
 use crate::verify;
+use crate::{planes, tears};
 use std::time::Instant;
 
 /// Cells tried, pixels.
@@ -92,6 +92,7 @@ impl Search<'_> {
         let atlas = atlas::build(self.scene, &self.hits, &source, &|_, _| {})?;
         let flat = Flat {
             tears: tears::find(self.scene, &self.tracer, &self.hits, &atlas.gbuffer),
+            planes: planes::find(self.scene, &self.hits, &atlas.gbuffer, atlas.image.labels.len()),
             atlas,
             rays: self.hits.samples.len() as u64,
             ray_seconds: self.ray_seconds,

@@ -9,6 +9,7 @@ use crate::format::{
     MAX_SECTIONS, MAX_SHEETS, PATH, Path, SPACE_CUBIC, Section, TIME_CUBIC, VERSION,
 };
 use crate::grid::Grid;
+use crate::plane::{CAMERA_BYTES, Camera, PLANE_BYTES};
 use heapless::Vec;
 
 /// A parsed bundle: cheap to copy around by reference, borrowing everything from the bytes.
@@ -20,6 +21,8 @@ pub struct Bundle<'a> {
     labels: &'a [[u8; LABEL_BYTES]],
     mask: &'a [u8],
     keys: &'a [[u8; KEY_BYTES]],
+    planes: &'a [[u8; PLANE_BYTES]],
+    cameras: &'a [[u8; CAMERA_BYTES]],
 }
 
 impl<'a> Bundle<'a> {
@@ -67,7 +70,8 @@ impl<'a> Bundle<'a> {
         check_atlas(&atlas)?;
         let mask = check_labels(labels, &atlas, find(MASK).unwrap_or(&[]))?;
         let keys = check_path(&path)?;
-        Ok(Self { sections, path, atlas, labels, mask, keys })
+        let (planes, cameras) = check_planes(&path, keys.len())?;
+        Ok(Self { sections, path, atlas, labels, mask, keys, planes, cameras })
     }
 
     /// Width and height of the screen, pixels.
@@ -147,6 +151,18 @@ impl<'a> Bundle<'a> {
     pub fn record(&self, key: usize) -> &'a [u8] {
         let start = key.checked_sub(1).map_or(0, |before| self.key(before).end as usize);
         self.path.records.get(start..self.key(key).end as usize).unwrap_or(&[])
+    }
+
+    /// The planes that positions are told from.
+    #[must_use]
+    pub fn planes(&self) -> &'a [[u8; PLANE_BYTES]] {
+        self.planes
+    }
+
+    /// From where `key` looks; from nowhere without planes.
+    #[must_use]
+    pub fn camera(&self, key: usize) -> Camera {
+        self.cameras.get(key).map_or_else(Camera::default, Camera::from_bytes)
     }
 
     pub(crate) fn grid(&self) -> Grid {
@@ -244,4 +260,18 @@ fn check_path<'a>(path: &Path<'a>) -> Result<&'a [[u8; KEY_BYTES]], BundleError>
     }
     length(end as usize, path.records.len(), "PATH records")?;
     Ok(keys)
+}
+
+/// The planes and the cameras of `keys` keys.
+fn check_planes<'a>(path: &Path<'a>, keys: usize) -> Result<(&'a [[u8; PLANE_BYTES]], &'a [[u8; CAMERA_BYTES]]), BundleError> {
+    let (planes, rest) = path.planes.as_chunks::<PLANE_BYTES>();
+    let found = path.planes.len();
+    length(found.saturating_sub(rest.len()), found, "PATH planes")?;
+    let (cameras, _) = path.cameras.as_chunks::<CAMERA_BYTES>();
+    let wanted = if planes.is_empty() { 0 } else { keys };
+    length(wanted.saturating_mul(CAMERA_BYTES), path.cameras.len(), "PATH cameras")?;
+    let labels = planes.iter().map(|[label, ..]| *label);
+    let ascending = labels.clone().zip(labels.skip(1)).all(|(label, next)| label < next);
+    field(ascending, "PATH planes", planes.len() as u32)?;
+    Ok((planes, cameras))
 }

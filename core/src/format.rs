@@ -181,6 +181,10 @@ pub struct Path<'a> {
     pub limits: Limits,
     /// One [`KEY_BYTES`]-byte entry a key.
     pub table: &'a [u8],
+    /// [`crate::plane::PLANE_BYTES`] a flat label that positions are told from, labels ascending.
+    pub planes: &'a [u8],
+    /// [`crate::plane::CAMERA_BYTES`] a key, where there are planes.
+    pub cameras: &'a [u8],
     /// The key records, one after the other.
     pub records: &'a [u8],
 }

@@ -5,6 +5,7 @@ use crate::coder::Probability;
 use crate::fixed::{KeyUv, field_distance};
 use crate::grid::Grid;
 use crate::lists::{Lists, Sheets};
+use crate::plane::{PLANE_BYTES, View};
 
 /// One key's layers in caller's memory, node by node, labels ascending.
 #[derive(Debug, Default)]
@@ -103,6 +104,10 @@ pub struct Setting<'s, 'm, L> {
     pub before_that: Option<(&'s Key<'m>, i32)>,
     /// The sheet lists of the intervals that end and start at this key.
     pub lists: [Option<&'s Lists<'m>>; 2],
+    /// The planes that positions are told from, labels ascending.
+    pub planes: &'s [[u8; PLANE_BYTES]],
+    /// How this key sees each plane.
+    pub views: &'s [View],
 }
 
 /// Where a layer stands.

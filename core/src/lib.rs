@@ -96,6 +96,7 @@ pub mod key;
 pub mod lists;
 mod memory;
 pub mod nodes;
+pub mod plane;
 mod player;
 mod predict;
 pub mod record;

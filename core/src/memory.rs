@@ -72,6 +72,7 @@ fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
             list_contexts: cutter.take(lists::CONTEXTS),
             key_contexts: cutter.take(nodes::CONTEXTS),
             traces: cutter.take(row_layers.saturating_mul(2)),
+            views: cutter.take(bundle.planes().len()),
             keys: core::array::from_fn(|slot| match slot < slots {
                 true => Key {
                     start: cutter.take(one_more(grid.nodes())),

@@ -387,6 +387,7 @@ impl<'a> Player<'a> {
             label: |label| bundle.label(label),
             key_bits: u32::from(bundle.path().key_bits),
             step_log2: u32::from(bundle.path().step_log2),
+            planes: bundle.planes(),
         };
         let bytes = coming.bits.left();
         while coming.done < coming.slices && coming.left() > left {

@@ -12,7 +12,7 @@ use crate::grid::Grid;
 use crate::key::{Key, Setting, Source, Spot};
 
 /// Competing predictors.
-const PREDICTORS: usize = 8;
+const PREDICTORS: usize = 10;
 /// Classes of how wrong the predictions were around a layer.
 const NOISE_CLASSES: usize = 9;
 /// Classes of how many of the eight cells around a node show the layer's label.
@@ -69,15 +69,20 @@ pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
 pub struct Trace {
     /// How far off each predictor was, steps, saturating.
     error: [u8; PREDICTORS],
-    /// Position less temporal prediction, 1/32 texel, saturating.
+    /// Position less temporal prediction, stored units, saturating.
     correction: [i16; 2],
+    /// Position less what its plane tells, stored units, saturating.
+    offset: [i16; 2],
     /// The residual that was coded, steps, saturating.
     noise: u8,
-    /// 1: there was a temporal prediction.
-    temporal: u8,
-    /// The trace keeps a multiple of its alignment.
-    unused: [u8; 2],
+    /// [`TEMPORAL`] and [`FLAT`].
+    known: u8,
 }
+
+/// [`Trace::known`]: there was a temporal prediction.
+const TEMPORAL: u8 = 1;
+/// [`Trace::known`]: there was a plane.
+const FLAT: u8 = 2;
 
 /// The position of a screen-fixed layer at a node: an affine function of the screen position.
 fn fixed(record: &LabelRecord, spot: &Spot, log2: u32, key_bits: u32) -> KeyUv {
@@ -147,6 +152,7 @@ impl Neighbours {
 struct Candidates {
     uv: [Option<[i32; 2]>; PREDICTORS],
     temporal: Option<[i32; 2]>,
+    flat: Option<[i32; 2]>,
 }
 
 fn plus(a: [i32; 2], b: [i32; 2]) -> [i32; 2] {
@@ -174,14 +180,20 @@ impl Candidates {
             Some((older, ratio)) => plus(held, minus(held, older).map(|d| d.wrapping_mul(ratio) >> 8)),
             None => held,
         });
-        let correction = |n: &Neighbour| (n.trace.temporal == 1).then(|| n.trace.correction.map(i32::from));
+        let correction = |n: &Neighbour| (n.trace.known & TEMPORAL != 0).then(|| n.trace.correction.map(i32::from));
         let corrected = temporal.zip(mean(around.all().filter_map(correction)));
         let plane = |w: [i32; 2], n: [i32; 2], nw: [i32; 2]| minus(plus(w, n), nw);
         let corner = around.west.as_ref().zip(around.north.as_ref()).zip(around.north_west.as_ref());
         let corner_correction = corner.and_then(|((w, n), nw)| Some(plane(correction(w)?, correction(n)?, correction(nw)?)));
         let line = |near: Option<Neighbour>, far: Option<[i32; 2]>| near.zip(far).map(|(near, far)| minus(plus(near.uv, near.uv), far));
         let lines = [line(around.west, around.far_west), line(around.north, around.far_north)];
+        let view = setting.planes.binary_search_by_key(&spot.label, |[label, ..]| *label).ok().and_then(|plane| setting.views.get(plane));
+        let flat = view.and_then(|view| view.at(spot.column, spot.row));
+        let offset = |n: &Neighbour| (n.trace.known & FLAT != 0).then(|| n.trace.offset.map(i32::from));
+        // Of equally good predictions the first is taken: what a plane tells is best where nothing else is known.
         let uv = [
+            flat,
+            flat.zip(mean(around.all().filter_map(offset))).map(|(f, o)| plus(f, o)),
             temporal,
             corrected.map(|(t, c)| plus(t, c)),
             corrected.map(|(t, c)| plus(t, c.map(|x| x >> 1))),
@@ -191,7 +203,7 @@ impl Candidates {
             mean(around.all().map(|n| n.uv)),
             older.and(held),
         ];
-        Self { uv, temporal }
+        Self { uv, temporal, flat }
     }
 
     /// The candidate that was best at the neighbours, and the class of how noisy they were.
@@ -221,7 +233,8 @@ impl Candidates {
         let size = |d: [i32; 2]| d.iter().map(|x| x.unsigned_abs()).fold(0u32, u32::saturating_add);
         let byte = |x: u32| x.min(255) as u8;
         let error = self.uv.map(|candidate| candidate.map_or(40, |c| byte(size(minus(actual, c)) >> step_log2)));
-        let correction = self.temporal.map_or([0, 0], |t| minus(actual, t)).map(|x| x.clamp(-32_768, 32_767) as i16);
-        Trace { error, correction, noise: byte(size(residual)), temporal: u8::from(self.temporal.is_some()), unused: [0; 2] }
+        let from = |known: Option<[i32; 2]>| known.map_or([0, 0], |t| minus(actual, t)).map(|x| x.clamp(-32_768, 32_767) as i16);
+        let known = if self.temporal.is_some() { TEMPORAL } else { 0 } | if self.flat.is_some() { FLAT } else { 0 };
+        Trace { error, correction: from(self.temporal), offset: from(self.flat), noise: byte(size(residual)), known }
     }
 }

@@ -8,6 +8,7 @@ use crate::grid::Grid;
 use crate::key::{Key, Setting, Source};
 use crate::lists::{self, Lists};
 use crate::nodes::{self, Trace};
+use crate::plane::{Camera, PLANE_BYTES, Plane, View};
 
 /// Keys held at a time, at most: four to play a cubic interval, and the one that is being coded.
 pub const MAX_KEYS: usize = 5;
@@ -23,6 +24,8 @@ pub struct Stream<'m> {
     pub key_contexts: &'m mut [Probability],
     /// Room for the layers of two rows of nodes: one trace each.
     pub traces: &'m mut [Trace],
+    /// Room for as many views as there are planes: how the key being coded sees them.
+    pub views: &'m mut [View],
     /// The last keys and the one being coded, in a ring of the first `slots`.
     pub keys: [Key<'m>; MAX_KEYS],
     /// The lists of the intervals that start at them, in a ring of the first `slots` too, or of as many as there are.
@@ -35,7 +38,7 @@ pub struct Stream<'m> {
 
 /// What does not change from record to record.
 #[derive(Clone, Copy, Debug)]
-pub struct Shape<L> {
+pub struct Shape<'p, L> {
     /// The grid.
     pub grid: Grid,
     /// Number of labels.
@@ -46,6 +49,8 @@ pub struct Shape<L> {
     pub key_bits: u32,
     /// Coordinates are coded in steps of 2^this of their units.
     pub step_log2: u32,
+    /// The planes that positions are told from, labels ascending.
+    pub planes: &'p [[u8; PLANE_BYTES]],
 }
 
 /// A record's place on the timeline.
@@ -61,6 +66,8 @@ pub struct Place {
     pub has_after: bool,
     /// Frames of the interval that ends here, and of the one before it.
     pub lengths: [u32; 2],
+    /// From where the key looks.
+    pub camera: Camera,
 }
 
 /// Rows of cells whose lists make a slice: about as much work as one row of nodes.
@@ -90,7 +97,7 @@ impl<'m> Stream<'m> {
     pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord + Copy>(
         &mut self,
         bits: &mut B,
-        shape: Shape<L>,
+        shape: Shape<'_, L>,
         place: Place,
         source: &mut S,
     ) {
@@ -106,7 +113,7 @@ impl<'m> Stream<'m> {
     pub fn slice<B: Bits, S: Source, L: Fn(u8) -> LabelRecord + Copy>(
         &mut self,
         bits: &mut B,
-        shape: Shape<L>,
+        shape: Shape<'_, L>,
         place: Place,
         slice: usize,
         source: &mut S,
@@ -114,6 +121,11 @@ impl<'m> Stream<'m> {
         if slice == 0 && place.independent {
             self.list_contexts.fill(Probability::NEW);
             self.key_contexts.fill(Probability::NEW);
+        }
+        if slice == 0 {
+            for (view, plane) in self.views.iter_mut().zip(shape.planes) {
+                *view = View::new(&Plane::from_bytes(plane), &place.camera, shape.key_bits);
+            }
         }
         let next = self.turn.wrapping_add(1);
         let (now_slot, list_slot, list_before_slot) = (self.key_slot(next), self.list_slot(next), self.list_slot(self.turn));
@@ -146,6 +158,8 @@ impl<'m> Stream<'m> {
                 before: self.key(0).filter(|_| place.run >= 1),
                 before_that: self.key(1).filter(|_| place.run >= 2).map(|key| (key, ratio(length, length_before))),
                 lists: [place.has_before.then_some(&lists_before), place.has_after.then_some(&lists_after)],
+                planes: shape.planes,
+                views: self.views,
             };
             nodes::code_row(bits, key_contexts, &setting, &mut now, traces, slice.wrapping_sub(after).wrapping_sub(before), source);
             (self.key_contexts, self.traces) = (key_contexts, traces);

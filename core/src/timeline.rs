@@ -123,6 +123,7 @@ impl Bundle<'_> {
             has_before: key > 0 || self.looping(),
             has_after: key < self.intervals(),
             lengths: [self.interval_length(at.wrapping_sub(1)), self.interval_length(at.wrapping_sub(2))],
+            camera: self.camera(key),
         }
     }
 }

@@ -10,6 +10,7 @@ use cubist_core::grid::Grid;
 use cubist_core::key::{Key, Nothing};
 use cubist_core::lists::{self, CHART, FIELD, Lists};
 use cubist_core::nodes::{self, Trace};
+use cubist_core::plane::View;
 use cubist_core::record::{LISTS, MAX_KEYS, Shape, Stream};
 use cubist_core::timeline;
 
@@ -109,6 +110,7 @@ impl<'a> Reference<'a> {
         let layers = usize::from(limits.key_layers);
         let mut contexts = [vec![Probability::NEW; lists::CONTEXTS], vec![Probability::NEW; nodes::CONTEXTS]];
         let mut traces = vec![Trace::default(); 2 * usize::from(limits.row_layers)];
+        let mut views = vec![View::default(); bundle.planes().len()];
         let mut key_memory: [_; MAX_KEYS] =
             std::array::from_fn(|_| (vec![0; grid.nodes() + 1], vec![0; layers], vec![0; layers], [vec![0; layers], vec![0; layers]]));
         let mut list_memory: [_; LISTS] = std::array::from_fn(|_| (vec![0; grid.rows + 1], vec![0; usize::from(limits.list_bytes)]));
@@ -117,6 +119,7 @@ impl<'a> Reference<'a> {
             list_contexts,
             key_contexts,
             traces: &mut traces,
+            views: &mut views,
             keys: key_memory.each_mut().map(|(start, label, uv, [a, b])| Key { start, label, uv, fields: [a, b] }),
             lists: list_memory.each_mut().map(|(rows, data)| Lists::new(rows, data)),
             slots: MAX_KEYS,
@@ -128,6 +131,7 @@ impl<'a> Reference<'a> {
             label: |label| bundle.label(label),
             key_bits: u32::from(path.key_bits),
             step_log2: u32::from(path.step_log2),
+            planes: bundle.planes(),
         };
         let mask = bundle.sections().find(|section| section.tag == MASK).map_or(&[][..], |section| section.bytes);
         let mut reference = Self { bundle, grid, keys: Vec::new(), lists: Vec::new(), mask };

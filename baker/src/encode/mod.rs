@@ -17,6 +17,7 @@ use cubist_core::format::{
 use cubist_core::key::{Key, Source};
 use cubist_core::lists::{self, Lists};
 use cubist_core::nodes::{self, Trace};
+use cubist_core::plane::{CAMERA_BYTES, Camera, PLANE_BYTES, Plane, View};
 use cubist_core::record::{LISTS, MAX_KEYS, Place, Shape, Stream};
 pub use limits::Exceeded;
 use range::Encoder;
@@ -59,6 +60,10 @@ pub struct Content<'a> {
     pub fit: &'a Fit,
     /// The layers' fields.
     pub fields: &'a Fields,
+    /// The planes that positions are told from, labels ascending.
+    pub planes: &'a [Plane],
+    /// From where every key looks, where there are planes.
+    pub cameras: &'a [Camera],
 }
 
 /// Makes the bytes of a bundle.
@@ -73,7 +78,9 @@ pub fn bundle(content: &Content<'_>, settings: CodingSettings, header: Header<'_
         record.flags |= if strip { STRIP } else { 0 };
     }
     let bounds = limits::of(content, &labels, settings)?;
-    let (table, records) = keys(content, &labels, settings, bounds);
+    let planes: Vec<[u8; PLANE_BYTES]> = content.planes.iter().map(Plane::to_bytes).collect();
+    let cameras: Vec<[u8; CAMERA_BYTES]> = content.cameras.iter().map(Camera::to_bytes).collect();
+    let (table, records) = keys(content, &labels, &planes, settings, bounds);
     let path = Path {
         width: gbuffer.width as u16,
         height: gbuffer.height as u16,
@@ -87,6 +94,8 @@ pub fn bundle(content: &Content<'_>, settings: CodingSettings, header: Header<'_
         step_log2: settings.step_log2,
         limits: bounds,
         table: &table,
+        planes: planes.as_flattened(),
+        cameras: cameras.as_flattened(),
         records: &records,
     };
     let palette: Vec<u8> = image.palette.iter().flat_map(|&colour| rgb565(colour).to_le_bytes()).collect();
@@ -151,9 +160,15 @@ fn label_record(label: &crate::atlas::Label, key_bits: u8) -> LabelRecord {
 }
 
 /// The key table and the records.
-fn keys(content: &Content<'_>, labels: &[LabelRecord], settings: CodingSettings, bounds: Limits) -> (Vec<u8>, Vec<u8>) {
+fn keys(
+    content: &Content<'_>,
+    labels: &[LabelRecord],
+    planes: &[[u8; PLANE_BYTES]],
+    settings: CodingSettings,
+    bounds: Limits,
+) -> (Vec<u8>, Vec<u8>) {
     let grid = content.grid;
-    let mut memory = Memory::new(grid, bounds);
+    let mut memory = Memory::new(grid, bounds, planes.len());
     let mut stream = memory.stream();
     let shape = Shape {
         grid: grid.grid,
@@ -161,6 +176,7 @@ fn keys(content: &Content<'_>, labels: &[LabelRecord], settings: CodingSettings,
         label: |label: u8| labels.get(usize::from(label)).copied().unwrap_or_default(),
         key_bits: u32::from(key_bits(content.image)),
         step_log2: u32::from(settings.step_log2),
+        planes,
     };
     let (mut table, mut records) = (Vec::new(), Vec::new());
     for (position, &frame) in grid.keys.iter().enumerate() {
@@ -171,6 +187,7 @@ fn keys(content: &Content<'_>, labels: &[LabelRecord], settings: CodingSettings,
             has_before: position > 0 || grid.looping,
             has_after: position < grid.intervals(),
             lengths: [grid.length(position as isize - 1), grid.length(position as isize - 2)],
+            camera: content.cameras.get(position).copied().unwrap_or_default(),
         };
         let mut source = Wanted { content, settings, key: position };
         let mut encoder = Encoder::default();
@@ -188,16 +205,18 @@ type OneKey = (Vec<u16>, Vec<u8>, Vec<u32>, [Vec<i8>; 2]);
 struct Memory {
     contexts: [Vec<Probability>; 2],
     traces: Vec<Trace>,
+    views: Vec<View>,
     keys: [OneKey; MAX_KEYS],
     lists: [(Vec<u16>, Vec<u8>); LISTS],
 }
 
 impl Memory {
-    fn new(grid: &KeyGrid, limits: Limits) -> Self {
+    fn new(grid: &KeyGrid, limits: Limits, planes: usize) -> Self {
         let layers = usize::from(limits.key_layers);
         Self {
             contexts: [vec![Probability::NEW; lists::CONTEXTS], vec![Probability::NEW; nodes::CONTEXTS]],
             traces: vec![Trace::default(); 2 * usize::from(limits.row_layers)],
+            views: vec![View::default(); planes],
             keys: std::array::from_fn(|_| {
                 (vec![0; grid.grid.nodes() + 1], vec![0; layers], vec![0; layers], [vec![0; layers], vec![0; layers]])
             }),
@@ -211,6 +230,7 @@ impl Memory {
             list_contexts,
             key_contexts,
             traces: &mut self.traces,
+            views: &mut self.views,
             keys: self.keys.each_mut().map(|(start, label, uv, [a, b])| Key { start, label, uv, fields: [a, b] }),
             lists: self.lists.each_mut().map(|(rows, data)| Lists::new(rows, data)),
             slots: MAX_KEYS,

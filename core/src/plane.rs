@@ -1,0 +1,178 @@
+//! Planes: where a flat surface's chart lies in space, and from where a key looks at it. Both together tell a layer's position, but for what
+//! the fit has moved: a plane's picture on the screen is a homography.
+//! Both come from the bundle; `predict` offers what they tell as one more prediction.
+//!
+//! A point of the plane is O + u A + v B; the ray from the eye E through a node goes along D. With C = E - O they meet at
+//! u = D (C x B) / D (A x B), v = D (A x C) / D (A x B): for a key that is a linear function of the node's place over another.
+
+/// Bytes of a [`Plane`].
+pub const PLANE_BYTES: usize = 38;
+/// Bytes of a [`Camera`].
+pub const CAMERA_BYTES: usize = 48;
+
+/// A vector in space, in the bundle's own units.
+pub type Vector = [i32; 3];
+
+/// Components below 2^24 in size, so that cross products fit 2^52.
+const AXIS_BITS: u32 = 24;
+
+/// A flat label: [`PLANE_BYTES`] little-endian bytes in the order of the fields.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct Plane {
+    /// The label.
+    pub label: u8,
+    /// The axes are 2^this times as long as a texel.
+    pub shift: u8,
+    /// The point of position (0, 0).
+    pub origin: Vector,
+    /// A texel along u, times 2^shift.
+    pub along_u: Vector,
+    /// A texel along v, times 2^shift.
+    pub along_v: Vector,
+}
+
+/// From where a key looks, and through where its nodes: [`CAMERA_BYTES`] little-endian bytes in the order of the fields.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct Camera {
+    /// The eye.
+    pub eye: Vector,
+    /// The direction through the first node; the length of directions does not matter, but below 2^28.
+    pub first: Vector,
+    /// What a column of nodes further adds.
+    pub column: Vector,
+    /// What a row of nodes further adds.
+    pub row: Vector,
+}
+
+/// The next vector of `bytes`.
+fn take(bytes: &mut &[u8]) -> Vector {
+    core::array::from_fn(|_| {
+        let Some((word, rest)) = bytes.split_first_chunk::<4>() else { return 0 };
+        *bytes = rest;
+        i32::from_le_bytes(*word)
+    })
+}
+
+fn put(bytes: &mut [u8], words: &[i32]) {
+    for (slot, word) in bytes.as_chunks_mut::<4>().0.iter_mut().zip(words) {
+        *slot = word.to_le_bytes();
+    }
+}
+
+impl Plane {
+    /// The plane in `bytes`.
+    #[must_use]
+    pub fn from_bytes(bytes: &[u8; PLANE_BYTES]) -> Self {
+        let [label, shift, rest @ ..] = bytes;
+        let rest = &mut &rest[..];
+        Self { label: *label, shift: *shift, origin: take(rest), along_u: take(rest), along_v: take(rest) }
+    }
+
+    /// The plane's bytes.
+    #[must_use]
+    pub fn to_bytes(&self) -> [u8; PLANE_BYTES] {
+        let mut bytes = [0; PLANE_BYTES];
+        let [label, shift, rest @ ..] = &mut bytes;
+        (*label, *shift) = (self.label, self.shift);
+        put(rest, [self.origin, self.along_u, self.along_v].as_flattened());
+        bytes
+    }
+}
+
+impl Camera {
+    /// The camera in `bytes`.
+    #[must_use]
+    pub fn from_bytes(bytes: &[u8; CAMERA_BYTES]) -> Self {
+        let rest = &mut &bytes[..];
+        Self { eye: take(rest), first: take(rest), column: take(rest), row: take(rest) }
+    }
+
+    /// The camera's bytes.
+    #[must_use]
+    pub fn to_bytes(&self) -> [u8; CAMERA_BYTES] {
+        let mut bytes = [0; CAMERA_BYTES];
+        put(&mut bytes, [self.eye, self.first, self.column, self.row].as_flattened());
+        bytes
+    }
+}
+
+/// A plane as a key sees it: positions as a homography of columns and rows of nodes, in caller's memory.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct View {
+    /// For u, v and what both are divided by: at the first node, a column further, a row further.
+    terms: [[i32; 3]; 3],
+    /// Stored units are quotients times 2^this.
+    scale: i32,
+}
+
+fn cross(a: [i64; 3], b: [i64; 3]) -> [i64; 3] {
+    let ([a, b, c], [d, e, f]) = (a, b);
+    let minor = |p: i64, q: i64, r: i64, s: i64| p.wrapping_mul(q).wrapping_sub(r.wrapping_mul(s));
+    [minor(b, f, c, e), minor(c, d, a, f), minor(a, e, b, d)]
+}
+
+fn dot(a: [i64; 3], b: [i64; 3]) -> i64 {
+    a.iter().zip(b).fold(0, |sum, (a, b)| sum.wrapping_add(a.wrapping_mul(b)))
+}
+
+/// How far numbers have to be shifted to the right so that none is 2^`bits` or more in size.
+fn excess<'v>(values: impl Iterator<Item = &'v i64>, bits: u32) -> u32 {
+    let used = values.map(|value| 64u32.wrapping_sub(value.unsigned_abs().leading_zeros())).max().unwrap_or(0);
+    used.saturating_sub(bits)
+}
+
+impl View {
+    /// `plane` seen by `camera`, for coordinates of `key_bits` fraction bits. Whatever the bytes say, there is some answer.
+    #[must_use]
+    pub fn new(plane: &Plane, camera: &Camera, key_bits: u32) -> Self {
+        let wide = |vector: Vector| vector.map(i64::from);
+        let axis = |vector: Vector| vector.map(|x| i64::from(x.clamp(-(1 << AXIS_BITS), 1 << AXIS_BITS)));
+        let (a, b) = (axis(plane.along_u), axis(plane.along_v));
+        // Points are below 2^27: their differences times axes fit 2^53.
+        let near = |vector: Vector| vector.map(|x| i64::from(x.clamp(-(1 << 27), 1 << 27)));
+        let mut c = [0i64; 3];
+        for (c, (eye, origin)) in c.iter_mut().zip(near(camera.eye).into_iter().zip(near(plane.origin))) {
+            *c = eye.wrapping_sub(origin);
+        }
+        let normal = cross(a, b);
+        let (for_u, for_v) = (cross(c, b), cross(a, c));
+        let directions = [camera.first, camera.column, camera.row].map(wide);
+        // Below 2^30 each, times directions below 2^28: sums of three fit 2^60.
+        let above = excess(for_u.iter().chain(&for_v), 30);
+        let below = excess(normal.iter(), 30);
+        // The plane lies ahead of the eye where the divisor has the other sign than this: at most 2^28 times 2^30, three times.
+        let flip = if dot(c, normal.map(|x| x.wrapping_shr(below))) < 0 { 1 } else { -1i64 };
+        let along = |vector: [i64; 3], shift: u32| {
+            let vector = vector.map(|x| x.wrapping_shr(shift).wrapping_mul(flip));
+            directions.map(|direction| dot(direction, vector))
+        };
+        let (u, v, divisor) = (along(for_u, above), along(for_v, above), along(normal, below));
+        let (over, under) = (excess(u.iter().chain(&v), 30), excess(divisor.iter(), 30));
+        let short = |terms: [i64; 3], shift: u32| terms.map(|term| term.wrapping_shr(shift) as i32);
+        // A numerator carries the axes' length once, the divisor twice.
+        let up = key_bits.wrapping_add(u32::from(plane.shift)).wrapping_add(above).wrapping_add(over) as i32;
+        Self { terms: [short(u, over), short(v, over), short(divisor, under)], scale: up.wrapping_sub(below.wrapping_add(under) as i32) }
+    }
+
+    /// The position at the node in `column` and `row`, stored units; `None` where the plane is behind the eye, or far out.
+    #[must_use]
+    pub fn at(&self, column: usize, row: usize) -> Option<[i32; 2]> {
+        let place = [1, column as i64, row as i64];
+        let [u, v, divisor] = self.terms.map(|terms| dot(terms.map(i64::from), place));
+        if divisor <= 0 {
+            return None;
+        }
+        let axis = |numerator: i64| {
+            // Terms are below 2^30 and there are at most 1025 nodes in a row: both are below 2^42.
+            let (numerator, divisor) = match self.scale {
+                up @ 0..=20 => (numerator.wrapping_shl(up as u32), divisor),
+                down @ -20..0 => (numerator, divisor.wrapping_shl(down.unsigned_abs())),
+                _ => return None,
+            };
+            let position = numerator.wrapping_add(divisor >> 1).checked_div_euclid(divisor)?;
+            i32::try_from(position).ok().filter(|position| position.unsigned_abs() < 1 << 17)
+        };
+        Some([axis(u)?, axis(v)?])
+    }
+}
