@@ -95,7 +95,7 @@ impl Default for Settings {
             time: TIME_CUBIC,
             space: SPACE_CUBIC,
             atlas: atlas::Settings::default(),
-            coding: CodingSettings { step_log2: 0, lambda: 0.05, independent_every: 16 },
+            coding: CodingSettings { step_log2: 0, lambda: 0.01, independent_every: 16 },
             least_pixels: 8,
             field_price: 4,
         }
@@ -173,7 +173,9 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let mut sheets = sheets::find(gbuffer, &grid, least);
     let layers = Layers::of(&grid, &sheets);
     progress("fitting keys", 0.2);
-    let fit = fit::solve(gbuffer, &grid, &sheets, &layers);
+    let charts: Vec<Option<FlatChart>> = stands_for.iter().map(|&label| flat.planes[usize::from(label)]).collect();
+    let lenses: Vec<Lens> = grid.keys.iter().map(|&frame| Lens::new(scene, frame)).collect();
+    let fit = fit::solve(gbuffer, &grid, &sheets, &layers, &planes::positions(&charts, &layers, &lenses, &grid));
     progress("ordering sheets", 0.5);
     let mut evidence =
         order::Evidence { gbuffer, grid: &grid, image, layers: &layers, fit: &fit, fields: None, field_price: settings.field_price };
@@ -184,8 +186,6 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     order::sort(&evidence, &mut sheets);
     progress("coding keys", 0.8);
     let header = encode::Header { fps: scene.playback.fps, info: &scene.name };
-    let charts: Vec<Option<FlatChart>> = stands_for.iter().map(|&label| flat.planes[usize::from(label)]).collect();
-    let lenses: Vec<Lens> = grid.keys.iter().map(|&frame| Lens::new(scene, frame)).collect();
     let (planes, cameras) = planes::records(&charts, &layers.by_label(image.labels.len()), &lenses, &grid);
     let content = Content {
         gbuffer,

@@ -18,6 +18,10 @@ const STEPS: usize = 60;
 /// Products are summed in this many runs of elements, whatever the number of threads.
 const RUNS: usize = 8;
 
+/// How much a layer's place on its plane counts, in pixels: it costs no bytes to be there, and where few pixels see a layer nothing else
+/// tells where it should be.
+fn PRIOR() -> f64 { std::env::var("PRIOR").ok().and_then(|x| x.parse().ok()).unwrap_or(0.5) }
+
 /// A layer that is not there.
 const NOWHERE: u32 = u32::MAX;
 
@@ -90,6 +94,8 @@ pub struct Problem<'a, T> {
     pub time: u8,
     /// How they are interpolated in space.
     pub space: u8,
+    /// What layers are held to where pixels say little: a position for each; `None`: nothing.
+    pub prior: Option<&'a [Option<([f32; 2], f32)>]>,
     /// The target and weight of a G-buffer pixel for the sheet at a place in the list of its cell (interval times cells plus cell);
     /// `None`: the sheet does not care.
     pub target: T,
@@ -106,12 +112,12 @@ pub struct Fit {
 
 /// Fits the positions of all layers.
 #[must_use]
-pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers) -> Fit {
+pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers, prior: &[Option<([f32; 2], f32)>]) -> Fit {
     let target = |index: usize, sheet: usize, pixel: usize| {
         let own = gbuffer.label[pixel] == u16::from(sheets.lists[index][sheet]);
         own.then(|| (gbuffer.uv[pixel], 1.0))
     };
-    solve_for(&Problem { grid, sheets, layers, time: grid.time, space: grid.space, target })
+    solve_for(&Problem { grid, sheets, layers, time: grid.time, space: grid.space, prior: Some(prior), target })
 }
 
 /// Fits two quantities of all layers to the targets of `problem`.
@@ -120,9 +126,27 @@ pub fn solve_for<T>(problem: &Problem<'_, T>) -> Fit
 where
     T: Fn(usize, usize, usize) -> Option<([f32; 2], f32)> + Sync,
 {
-    let System { elements, right, diagonal, start } = assemble(problem);
+    let System { elements, mut right, mut diagonal, start } = assemble(problem);
     let weights = Weights::new(problem);
-    let uv = conjugate_gradients(&|x, y| multiply(&elements, &weights, x, y), &right, &diagonal, start);
+    let mut held = vec![0.0f64; right.len()];
+    for (layer, prior) in problem.prior.into_iter().flatten().enumerate() {
+        if let Some((prior, sure)) = prior {
+            let weight = PRIOR() * f64::from(*sure);
+            held[layer] = weight;
+            diagonal[layer] += weight;
+            for (right, prior) in right[layer].iter_mut().zip(prior) {
+                *right += weight * f64::from(*prior);
+            }
+        }
+    }
+    let product = |x: &[[f64; 2]], y: &mut [[f64; 2]]| {
+        multiply(&elements, &weights, x, y);
+        for ((y, x), held) in y.iter_mut().zip(x).zip(&held) {
+            y[0] += held * x[0];
+            y[1] += held * x[1];
+        }
+    };
+    let uv = conjugate_gradients(&product, &right, &diagonal, start);
     Fit { uv: uv.iter().map(|uv| uv.map(|x| x as f32)).collect(), weight: diagonal.iter().map(|&d| d as f32).collect() }
 }
 

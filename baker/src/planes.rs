@@ -4,10 +4,11 @@
 
 use crate::gbuffer::{GBuffer, Hits, Lens};
 use crate::scene::Scene;
-use crate::sheets::KeyGrid;
+use crate::sheets::{KeyGrid, Layers};
 use cubist_core::plane::{Camera, Plane, Vector};
 use glam::DVec3;
 
+fn BEND() -> f64 { std::env::var("BEND").ok().and_then(|x| x.parse().ok()).unwrap_or(1.0) }
 /// Every this many pixels one is looked at.
 const SPARSE: usize = 7;
 /// A point farther than this from where its position says, texels, shows that a label is not flat.
@@ -76,6 +77,35 @@ fn flat_chart(seen: &[([f64; 2], DVec3)]) -> Option<FlatChart> {
     let texel = along_u.length().min(along_v.length());
     let flat = texel > 0.0 && seen.iter().all(|&(at, point)| (chart.point(at) - point).length() <= FLAT * texel);
     flat.then_some(chart)
+}
+
+/// Where every layer's ray meets its label's plane, texels, and how sure it is that the layer belongs there, 0..=1; `None` where there is no
+/// such plane, or no such point.
+///
+/// Towards its horizon a plane's picture bends more and more from node to node. What is interpolated between nodes cannot follow it
+/// there, and the best layers are elsewhere.
+#[must_use]
+pub fn positions(charts: &[Option<FlatChart>], layers: &Layers, lenses: &[Lens], grid: &KeyGrid) -> Vec<Option<([f32; 2], f32)>> {
+    let (nodes, width, size) = (grid.grid.nodes(), grid.grid.node_columns(), f64::from(1u32 << grid.grid.log2));
+    let mut positions = vec![None; layers.label.len()];
+    for (key, lens) in lenses.iter().enumerate() {
+        for node in 0..nodes {
+            let [x, y] = [node % width, node / width].map(|at| at as f64 * size + 0.5);
+            let directions = [[0.0, 0.0], [-size, 0.0], [size, 0.0], [0.0, -size], [0.0, size]].map(|[dx, dy]| lens.ray(x + dx, y + dy));
+            let place = |chart: FlatChart| {
+                let [at, left, right, up, down] = directions.map(|direction| chart.seen(lens.eye, direction));
+                let at = at?;
+                let bend = |a: [f64; 2], b: [f64; 2]| (a[0] + b[0] - 2.0 * at[0]).hypot(a[1] + b[1] - 2.0 * at[1]) / BEND();
+                let (across, along) = (bend(left?, right?), bend(up?, down?));
+                Some((at.map(|x| x as f32), (1.0 / (1.0 + across * across + along * along)) as f32))
+            };
+            let at = layers.start[key * nodes + node] as usize..layers.start[key * nodes + node + 1] as usize;
+            for (position, &label) in positions[at.clone()].iter_mut().zip(&layers.label[at]) {
+                *position = charts[usize::from(label)].and_then(place);
+            }
+        }
+    }
+    positions
 }
 
 /// The records of the planes that are worth it, labels ascending, and of every key's camera. `charts` are by label, `layers` counts each label's
