@@ -108,7 +108,7 @@ impl Video {
     pub fn steps(self) -> Vec<u32> {
         match self {
             Self::Mjpeg(_) | Self::Mpeg1(_) => (1..=31).rev().collect(),
-            Self::Gif => vec![2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 80, 96, 128, 160, 192, 224, 256],
+            Self::Gif => vec![4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 80, 96, 128, 160, 192, 224, 256],
             Self::H264(..) => (1..=51).rev().step_by(2).collect(),
         }
     }
