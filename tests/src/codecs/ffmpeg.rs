@@ -107,7 +107,8 @@ impl Video {
     #[must_use]
     pub fn steps(self) -> Vec<u32> {
         match self {
-            Self::Mjpeg(_) | Self::Mpeg1(_) => (1..=31).rev().collect(),
+            Self::Mjpeg(_) => vec![69, 60, 52, 45, 40, 36, 32, 28, 25, 22, 20, 18, 16, 14, 12, 11, 10, 9, 8, 7, 6, 5, 4, 3, 2, 1],
+            Self::Mpeg1(_) => (1..=31).rev().collect(),
             Self::Gif => vec![4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 80, 96, 128, 160, 192, 224, 256],
             Self::H264(..) => (1..=51).rev().step_by(2).collect(),
         }
@@ -119,7 +120,7 @@ impl Video {
         let text = match self {
             Self::Mjpeg(chroma) => {
                 let filter = format!("scale=out_color_matrix=bt601:out_range=full:{EXACT},format=yuvj{}", yuv(chroma));
-                format!("-vf {filter} -c:v mjpeg -huffman optimal -qmin 1 -q:v {quality} -f mjpeg")
+                format!("-vf {filter} -c:v mjpeg -huffman optimal -qmin 1 -qmax 69 -q:v {quality} -f mjpeg")
             }
             Self::Gif => {
                 // One colour of the palette is for what does not change.

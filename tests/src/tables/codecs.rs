@@ -12,6 +12,7 @@ use cubist_baker::bake::Settings;
 use cubist_baker::scene::Scene;
 use rayon::prelude::*;
 use serde_json::{Value, json};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// The scenes of the table unless others are named.
 pub const SCENES: [&str; 4] = ["cone-orbit", "street", "torus", "arch"];
@@ -60,13 +61,15 @@ pub fn measure(scene: &Scene, ffmpeg: Option<&Ffmpeg>) -> Result<Vec<Value>> {
     };
     let codecs = Codec::all(ffmpeg, gops());
     let jobs: Vec<(usize, usize)> = (0..codecs.len()).flat_map(|codec| (0..COMPARISONS.len()).map(move |c| (codec, c))).collect();
+    let done = AtomicUsize::new(0);
     let found = jobs
         .par_iter()
         .map(|&(codec, comparison)| {
             let (_, title, truth, metric) = COMPARISONS[comparison];
             let asked = metric.of(ours.likeness[usize::from(truth)]);
             let found = codecs[codec].equal(&sources[usize::from(truth)], metric, asked);
-            eprintln!("{}: {}: {title}: done", scene.name, codecs[codec].name());
+            let done = done.fetch_add(1, Ordering::Relaxed) + 1;
+            eprintln!("{}: {done} of {} comparisons: {}, {title}", scene.name, jobs.len(), codecs[codec].name());
             found
         })
         .collect::<Result<Vec<Option<Match>>>>()
