@@ -6,7 +6,8 @@ use clap::{Parser, Subcommand};
 use cubist_baker::bake::Settings;
 use cubist_baker::scene::{Overrides, builtin, load, load_builtin};
 use cubist_tests::codecs::ffmpeg::Ffmpeg;
-use cubist_tests::tables::{self, Table, codecs, coverage, document};
+use cubist_tests::tables::document::Document;
+use cubist_tests::tables::{self, Table, codecs, coverage};
 use std::path::PathBuf;
 
 /// Prints the tables of the README and the docs.
@@ -71,13 +72,13 @@ fn table(name: &Name, overrides: &Overrides) -> Result<Table> {
             for name in builtin::NAMES {
                 rows.push(tables::builtin::measure(&load_builtin(name, overrides)?)?);
             }
-            tables::builtin::table("builtin", rows)
+            tables::builtin::table(rows)
         }
         Name::Scenes { folder } => {
             for file in tables::builtin::scene_files(folder)? {
                 rows.push(tables::builtin::measure(&load(&file, overrides)?)?);
             }
-            tables::builtin::table("scenes", rows)
+            tables::builtin::table(rows)
         }
         Name::Coverage { scenes, cell } => {
             let cells = if cell.is_empty() { vec![Settings::default().cell] } else { cell.clone() };
@@ -101,13 +102,25 @@ fn table(name: &Name, overrides: &Overrides) -> Result<Table> {
     })
 }
 
+impl Name {
+    /// What stands in the table's marker.
+    fn marker(&self) -> &'static str {
+        match self {
+            Self::Builtin => "builtin",
+            Self::Scenes { .. } => "scenes",
+            Self::Coverage { .. } => "coverage",
+            Self::Codecs { .. } => "codecs",
+        }
+    }
+}
+
 fn main() -> Result<()> {
     let arguments = Arguments::parse();
+    let document = arguments.write.as_deref().map(|file| Document::open(file, arguments.table.marker())).transpose()?;
     let overrides = Overrides { size: arguments.size, frames: arguments.frames, ..Overrides::default() };
     let table = table(&arguments.table, &overrides)?;
-    if let Some(file) = &arguments.write {
-        document::write(file, table.name, &table.markdown)?;
-        eprintln!("{}: the table {} is up to date", file.display(), table.name);
+    if let Some(document) = document {
+        document.write(&table.markdown)?;
     } else if arguments.json {
         println!("{}", serde_json::to_string_pretty(&table.json)?);
     } else {

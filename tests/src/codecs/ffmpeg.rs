@@ -80,6 +80,12 @@ impl Video {
         ]
     }
 
+    /// Whether it can encode frames of that size: x264 samples colour differences of pairs of pixels only.
+    #[must_use]
+    pub fn fits(self, shape: Shape) -> bool {
+        !matches!(self, Self::H264(Chroma::Quarter, _)) || (shape.width.is_multiple_of(2) && shape.height.is_multiple_of(2))
+    }
+
     /// What the table calls it.
     #[must_use]
     pub fn name(self) -> String {
@@ -201,10 +207,10 @@ mod tests {
     use crate::codecs::Source;
 
     /// A gradient that moves.
-    fn source(folder: &Path) -> Source {
-        let shape = Shape { width: 64, height: 48, frames: 5 };
+    fn source(folder: &Path, width: u32, height: u32) -> Source {
+        let shape = Shape { width, height, frames: 5 };
         let pixel = |frame: u32, x: u32, y: u32| [2 * x + 8 * frame, 4 * y, 60 + x + y].map(|v| v.min(255) as u8);
-        let frames = (0..5).flat_map(|f| (0..48).flat_map(move |y| (0..64).flat_map(move |x| pixel(f, x, y))));
+        let frames = (0..5).flat_map(|f| (0..height).flat_map(move |y| (0..width).flat_map(move |x| pixel(f, x, y))));
         Source::new(shape, frames.collect(), folder, "gradient").unwrap()
     }
 
@@ -212,7 +218,7 @@ mod tests {
     fn steps_go_from_coarse_to_fine_and_colours_come_back() {
         let Some(ffmpeg) = Ffmpeg::find() else { return };
         let folder = tempfile::tempdir().unwrap();
-        let source = source(folder.path());
+        let source = source(folder.path(), 64, 48);
         for video in Video::all([128, 8]).into_iter().filter(|&video| ffmpeg.has(video)) {
             let steps = video.steps();
             let ends = [steps[0], steps[steps.len() - 1]].map(|quality| {
@@ -223,6 +229,18 @@ mod tests {
             // A wrong matrix or range would stay below 30 dB.
             assert!(ends[0].1 < ends[1].1 && ends[1].1 > 35.0, "{video:?}: {ends:?} bytes, dB");
         }
+    }
+
+    #[test]
+    fn what_fits_an_odd_screen_encodes_it() {
+        let Some(ffmpeg) = Ffmpeg::find() else { return };
+        let folder = tempfile::tempdir().unwrap();
+        let source = source(folder.path(), 33, 25);
+        let all = Video::all([128, 8]).into_iter().filter(|&video| ffmpeg.has(video));
+        for video in all.filter(|video| video.fits(source.shape)) {
+            assert!(round_trip(video, video.steps()[5], Metric::Ssim, source.shape, &source.file).is_ok(), "{video:?}");
+        }
+        assert!(!Video::H264(Chroma::Quarter, 8).fits(source.shape) && Video::H264(Chroma::Full, 8).fits(source.shape));
     }
 
     #[test]

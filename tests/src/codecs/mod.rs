@@ -77,11 +77,11 @@ impl Codec {
         }
     }
 
-    /// All that can be run, given what ffmpeg there is; `gops` are the key frame intervals of the codecs that have such.
+    /// All that can be run on such clips, given what ffmpeg there is; `gops` are the key frame intervals of the codecs that have such.
     #[must_use]
-    pub fn all(ffmpeg: Option<&Ffmpeg>, gops: [u32; 2]) -> Vec<Self> {
+    pub fn all(ffmpeg: Option<&Ffmpeg>, gops: [u32; 2], shape: Shape) -> Vec<Self> {
         let Some(ffmpeg) = ffmpeg else { return vec![Self::PlainGif] };
-        Video::all(gops).into_iter().filter(|video| ffmpeg.has(*video)).map(Self::Video).collect()
+        Video::all(gops).into_iter().filter(|video| ffmpeg.has(*video) && video.fits(shape)).map(Self::Video).collect()
     }
 
     /// What the codec takes for `source` to be as good as `asked` by `metric`.
@@ -115,7 +115,7 @@ mod tests {
         // Three flat frames of different grey: a GIF holds them exactly.
         let rgb: Vec<u8> = [0u8, 100, 200].into_iter().flat_map(|grey| vec![grey; shape.frame_bytes()]).collect();
         let source = Source::new(shape, rgb, folder.path(), "flat").unwrap();
-        let codecs = Codec::all(None, [128, 8]);
+        let codecs = Codec::all(None, [128, 8], shape);
         let [gif] = codecs.as_slice() else { panic!("{codecs:?}") };
         let Some(Match::Coarsest(point)) = gif.equal(&source, Metric::Psnr, 40.0).unwrap() else { panic!("a GIF is as good as that") };
         assert_eq!(point.score, 99.0);

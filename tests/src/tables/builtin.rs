@@ -62,13 +62,13 @@ pub fn measure(scene: &Scene) -> Result<Value> {
     }))
 }
 
-/// The table called `name` of the rows that [`measure`] gave.
+/// The table of the rows that [`measure`] gave.
 #[must_use]
-pub fn table(name: &'static str, rows: Vec<Value>) -> Table {
+pub fn table(rows: Vec<Value>) -> Table {
     let cell = |row: &Value, key: &str, digits: usize| row[key].as_str().map_or_else(|| number(&row[key], digits), str::to_owned);
     let cells = |row: &Value| COLUMNS.iter().map(|&(key, _, digits)| cell(row, key, digits)).collect();
     let lines: Vec<Vec<String>> = rows.iter().map(cells).collect();
-    Table { name, markdown: markdown(&COLUMNS.map(|column| column.1), 1, &lines), json: Value::from(rows) }
+    Table { markdown: markdown(&COLUMNS.map(|column| column.1), 1, &lines), json: Value::from(rows) }
 }
 
 /// The scene files of a folder, by name.

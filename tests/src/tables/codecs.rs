@@ -59,7 +59,7 @@ pub fn measure(scene: &Scene, ffmpeg: Option<&Ffmpeg>) -> Result<Vec<Value>> {
         bytes_per_frame: encoded.bundle.len() as f64 / f64::from(shape.frames),
         likeness: [0, 1].map(|i: usize| sources[i].compare(&played)),
     };
-    let codecs = Codec::all(ffmpeg, gops());
+    let codecs = Codec::all(ffmpeg, gops(), shape);
     let jobs: Vec<(usize, usize)> = (0..codecs.len()).flat_map(|codec| (0..COMPARISONS.len()).map(move |c| (codec, c))).collect();
     let done = AtomicUsize::new(0);
     let found = jobs
@@ -147,7 +147,7 @@ pub fn table(rows: Vec<Value>, ffmpeg: Option<&Ffmpeg>) -> Table {
         format!("\n{shape}; {codecs}.")
     });
     conditions += "\n";
-    Table { name: "codecs", markdown: markdown(&titles, 2, &lines) + &conditions, json: Value::from(rows) }
+    Table { markdown: markdown(&titles, 2, &lines) + &conditions, json: Value::from(rows) }
 }
 
 #[cfg(test)]

@@ -106,7 +106,7 @@ pub fn table(rows: Vec<Value>) -> Table {
         let [size, interval] = [&row["size"], &row["key_interval"]];
         format!("\n{} x {} pixels, {} frames, a key every {interval} frames.\n", size[0], size[1], row["frames"])
     });
-    Table { name: "coverage", markdown: markdown(&titles, 1, &lines) + &conditions, json: Value::from(rows) }
+    Table { markdown: markdown(&titles, 1, &lines) + &conditions, json: Value::from(rows) }
 }
 
 #[cfg(test)]

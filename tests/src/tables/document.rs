@@ -22,14 +22,36 @@ pub fn replaced(document: &str, name: &str, table: &str) -> Result<String> {
     Ok(format!("{before}{start}{}\n{}", table.trim_end(), &after[end..]))
 }
 
-/// Replaces the table called `name` in a file.
-///
-/// # Errors
-/// The file cannot be read or written, or has no place for the table.
-pub fn write(file: &Path, name: &str, table: &str) -> Result<()> {
-    let document = std::fs::read_to_string(file).with_context(|| format!("read {}", file.display()))?;
-    let document = replaced(&document, name, table).with_context(|| file.display().to_string())?;
-    std::fs::write(file, document).with_context(|| format!("write {}", file.display()))
+/// A document that has a place for a table.
+pub struct Document<'a> {
+    file: &'a Path,
+    name: &'a str,
+}
+
+impl<'a> Document<'a> {
+    /// Reads a document and looks for the place of the table called `name`: before hours of measuring, not after.
+    ///
+    /// # Errors
+    /// The file cannot be read, or has no place for the table.
+    pub fn open(file: &'a Path, name: &'a str) -> Result<Self> {
+        let document = Self { file, name };
+        document.replaced("")?;
+        Ok(document)
+    }
+
+    fn replaced(&self, table: &str) -> Result<String> {
+        let text = std::fs::read_to_string(self.file).with_context(|| format!("read {}", self.file.display()))?;
+        replaced(&text, self.name, table).with_context(|| self.file.display().to_string())
+    }
+
+    /// Replaces the table in what the file holds now: it may have changed since it was opened.
+    ///
+    /// # Errors
+    /// The file cannot be read or written, or has no place for the table any more.
+    pub fn write(self, table: &str) -> Result<()> {
+        let text = self.replaced(table)?;
+        std::fs::write(self.file, text).with_context(|| format!("write {}", self.file.display()))
+    }
 }
 
 #[cfg(test)]
@@ -61,11 +83,23 @@ mod tests {
     }
 
     #[test]
+    fn a_document_is_written_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("document.md");
+        std::fs::write(&file, DOCUMENT).unwrap();
+        Document::open(&file, "b").unwrap().write("| new |\n").unwrap();
+        assert_eq!(std::fs::read_to_string(&file).unwrap(), replaced(DOCUMENT, "b", "| new |").unwrap());
+        for (file, name) in [(file.clone(), "c"), (folder.path().join("none.md"), "a")] {
+            let error = format!("{:#}", Document::open(&file, name).err().unwrap());
+            assert!(error.contains(&file.display().to_string()), "{error}");
+        }
+    }
+
+    #[test]
     fn the_documents_have_places_for_their_tables() {
         let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
         for (file, name) in [("README.md", "builtin"), ("docs/comparison.md", "coverage"), ("docs/comparison.md", "codecs")] {
-            let document = std::fs::read_to_string(root.join(file)).unwrap();
-            assert!(replaced(&document, name, "").is_ok(), "{file}: {name}");
+            Document::open(&root.join(file), name).map_err(|error| format!("{error:#}")).map(drop).unwrap();
         }
     }
 }

@@ -14,8 +14,6 @@ use std::path::Path;
 /// A finished table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// What stands in the document's marker.
-    pub name: &'static str,
     /// Markdown, with a line of conditions below where there are any.
     pub markdown: String,
     /// The same figures for scripts.
