@@ -147,13 +147,14 @@ pub fn perfect(bytes: &[u8], atlas: &Atlas) -> Result<Score> {
     Ok(compare(atlas, |frame| {
         let start = frame as usize * size;
         let rays = gbuffer.label[start..].iter().zip(&gbuffer.uv[start..]);
-        let choose = |(sheets, (&label, exact)): (Vec<(u8, [f64; 2])>, (&u16, &[f32; 2]))| {
+        let mut shown = Vec::with_capacity(size);
+        for (sheets, (&label, exact)) in reference.candidates(frame, Weights::Player).into_iter().zip(rays) {
             let exact = exact.map(f64::from);
             let off = |at: &[f64; 2]| (at[0] - exact[0]).abs().max((at[1] - exact[1]).abs());
             let own = sheets.into_iter().filter(|&(sheet, _)| charts[usize::from(sheet)] == usize::from(label)).map(|(_, at)| at);
-            (own.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(exact), true)
-        };
-        reference.candidates(frame, Weights::Player).into_iter().zip(rays).map(choose).collect()
+            shown.push((own.min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(exact), true));
+        }
+        shown
     }))
 }
 
