@@ -83,7 +83,7 @@ fn table(name: &Name, overrides: &Overrides) -> Result<Table> {
         Name::Coverage { scenes, cell } => {
             let cells = if cell.is_empty() { vec![Settings::default().cell] } else { cell.clone() };
             let (size, frames) = (overrides.size.or(Some(coverage::SIZE)), overrides.frames.or(Some(coverage::FRAMES)));
-            let overrides = Overrides { size, frames, ..overrides.clone() };
+            let overrides = Overrides { size, frames, ..*overrides };
             for name in or_default(scenes, &coverage::SCENES) {
                 rows.extend(coverage::measure(&tables::scene(&name, &overrides)?, &cells)?);
             }
