@@ -66,6 +66,18 @@ pub enum BakeError {
     Limit(#[from] encode::Exceeded),
 }
 
+/// The coverage tests that torn cells may use: all of them, or one alone to see what it is worth.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Coverage {
+    /// Charts, fields, and both at once, whichever tells best in each cell.
+    #[default]
+    All,
+    /// Charts alone: no fields are stored.
+    Chart,
+    /// Fields alone.
+    Field,
+}
+
 /// What may be chosen about a bundle.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
@@ -85,6 +97,8 @@ pub struct Settings {
     pub least_pixels: u32,
     /// Wrong pixels that a field has to save in a cell and interval to be used.
     pub field_price: u32,
+    /// The coverage tests to choose from.
+    pub coverage: Coverage,
 }
 
 impl Default for Settings {
@@ -98,6 +112,7 @@ impl Default for Settings {
             coding: CodingSettings { step_log2: 0, lambda: 0.01, independent_every: 16 },
             least_pixels: 8,
             field_price: 4,
+            coverage: Coverage::All,
         }
     }
 }
@@ -177,8 +192,8 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let lenses: Vec<Lens> = grid.keys.iter().map(|&frame| Lens::new(scene, frame)).collect();
     let fit = fit::solve(gbuffer, &grid, &sheets, &layers, &planes::positions(&charts, &layers, &lenses, &grid));
     progress("ordering sheets", 0.5);
-    let mut evidence =
-        order::Evidence { gbuffer, grid: &grid, image, layers: &layers, fit: &fit, fields: None, field_price: settings.field_price };
+    let &Settings { field_price, coverage, .. } = settings;
+    let mut evidence = order::Evidence { gbuffer, grid: &grid, image, layers: &layers, fit: &fit, fields: None, field_price, coverage };
     order::sort(&evidence, &mut sheets);
     progress("fitting outlines", 0.6);
     let fields = fields::solve(gbuffer, &grid, &sheets, &layers, image.labels.len());

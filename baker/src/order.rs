@@ -3,6 +3,7 @@
 //! to `encode`.
 
 use crate::atlas::SourceImage;
+use crate::bake::Coverage;
 use crate::fields::Fields;
 use crate::fit::Fit;
 use crate::gbuffer::GBuffer;
@@ -31,6 +32,23 @@ pub struct Evidence<'a> {
     pub fields: Option<&'a Fields>,
     /// A field has to save this many pixels in a cell and interval to be worth its bytes.
     pub field_price: u32,
+    /// The tests to choose from.
+    pub coverage: Coverage,
+}
+
+/// A test that a sheet may have, and what it costs, pixels.
+type Candidate = (u16, u32);
+
+impl Evidence<'_> {
+    /// The tests to choose from: before the fields are known only the chart's.
+    fn candidates(&self) -> Vec<Candidate> {
+        let price = self.field_price;
+        match (self.fields, self.coverage) {
+            (None, _) | (_, Coverage::Chart) => vec![(CHART, 0)],
+            (_, Coverage::Field) => vec![(FIELD, price)],
+            (_, Coverage::All) => vec![(CHART, 0), (FIELD, price), (BOTH, price)],
+        }
+    }
 }
 
 /// Pixels of a torn cell that see the same.
@@ -65,6 +83,7 @@ struct Choice {
 /// Sorts the sheets of every cell front to back and chooses their tests. Returns the pixels at which
 /// another sheet than the right one will show.
 pub fn sort(evidence: &Evidence<'_>, sheets: &mut Sheets) -> u64 {
+    let candidates = &evidence.candidates();
     let wrong: Vec<u64> = sheets
         .lists
         .par_iter_mut()
@@ -75,8 +94,8 @@ pub fn sort(evidence: &Evidence<'_>, sheets: &mut Sheets) -> u64 {
                 return 0;
             }
             let groups = observe(evidence, index, list);
-            let price = evidence.fields.map(|_| evidence.field_price);
-            let choice = if list.len() <= EXHAUSTIVE { best(&groups, list.len(), price) } else { greedy(&groups, list.len(), price) };
+            let choose = if list.len() <= EXHAUSTIVE { best } else { greedy };
+            let choice = choose(&groups, list.len(), candidates);
             *list = choice.order.iter().map(|&sheet| list[sheet]).collect();
             *tests = choice.tests;
             u64::from(choice.wrong)
@@ -133,16 +152,14 @@ fn covers(image: &SourceImage, label: u8, [u, v]: [f32; 2]) -> bool {
     !label.masked || image.covered[v as usize * image.width as usize + u as usize]
 }
 
-/// The tests and the cost of an order: each sheet's test is chosen in turn, front to back. `price` of a field; `None`: there are none.
-fn weigh(groups: &[Group], order: &[usize], price: Option<u32>) -> Choice {
+/// The tests and the cost of an order: each sheet's test is chosen of `candidates` in turn, front to back.
+fn weigh(groups: &[Group], order: &[usize], candidates: &[Candidate]) -> Choice {
     let mut choice = Choice { order: order.to_vec(), tests: 0, wrong: 0, cost: 0 };
     let mut left: Vec<&Group> = groups.iter().collect();
     for (place, &sheet) in order[..order.len() - 1].iter().enumerate() {
         let wrong = |test: u16| -> u32 { left.iter().filter(|g| g.covers(sheet, test) != (g.sheet == sheet)).map(|g| g.pixels).sum() };
-        let candidates = [(CHART, 0), (FIELD, price.unwrap_or(0)), (BOTH, price.unwrap_or(0))];
-        let tried = candidates.into_iter().take(if price.is_some() { 3 } else { 1 });
-        let (cost, wrong, test) =
-            tried.map(|(test, price)| (wrong(test) + price, wrong(test), test)).min_by_key(|&(cost, _, _)| cost).unwrap_or((0, 0, CHART));
+        let tried = candidates.iter().map(|&(test, price)| (wrong(test) + price, wrong(test), test));
+        let (cost, wrong, test) = tried.min_by_key(|&(cost, _, _)| cost).unwrap_or((0, 0, CHART));
         choice.tests |= test << (2 * place);
         choice.wrong += wrong;
         choice.cost += cost;
@@ -157,11 +174,11 @@ fn weigh(groups: &[Group], order: &[usize], price: Option<u32>) -> Choice {
 }
 
 /// The order with the least cost; of equal ones the first in lexical order.
-fn best(groups: &[Group], count: usize, price: Option<u32>) -> Choice {
+fn best(groups: &[Group], count: usize, candidates: &[Candidate]) -> Choice {
     let mut order: Vec<usize> = (0..count).collect();
-    let mut found = weigh(groups, &order, price);
+    let mut found = weigh(groups, &order, candidates);
     while next_permutation(&mut order) {
-        let choice = weigh(groups, &order, price);
+        let choice = weigh(groups, &order, candidates);
         if choice.cost < found.cost {
             found = choice;
         }
@@ -179,22 +196,21 @@ fn next_permutation(order: &mut [usize]) -> bool {
 }
 
 /// Front to back, always the sheet that gets the fewest of the pixels still to come wrong.
-fn greedy(groups: &[Group], count: usize, price: Option<u32>) -> Choice {
+fn greedy(groups: &[Group], count: usize, candidates: &[Candidate]) -> Choice {
     let mut rest: Vec<usize> = (0..count.min(MAX_SHEETS)).collect();
     let mut order = Vec::with_capacity(count);
     let mut left: Vec<&Group> = groups.iter().collect();
-    let tests: &[u16] = if price.is_some() { &[CHART, FIELD, BOTH] } else { &[CHART] };
     while !rest.is_empty() {
         let wrong = |sheet: usize, test: u16| -> u32 {
             left.iter().filter(|g| g.covers(sheet, test) != (g.sheet == sheet)).map(|g| g.pixels).sum()
         };
-        let candidates = rest.iter().enumerate().flat_map(|(at, &sheet)| tests.iter().map(move |&test| (at, sheet, test)));
-        let Some((at, sheet, test)) = candidates.min_by_key(|&(_, sheet, test)| wrong(sheet, test)) else { break };
+        let tried = rest.iter().enumerate().flat_map(|(at, &sheet)| candidates.iter().map(move |&(test, _)| (at, sheet, test)));
+        let Some((at, sheet, test)) = tried.min_by_key(|&(_, sheet, test)| wrong(sheet, test)) else { break };
         rest.remove(at);
         order.push(sheet);
         left.retain(|g| !g.covers(sheet, test) && g.sheet != sheet);
     }
-    weigh(groups, &order, price)
+    weigh(groups, &order, candidates)
 }
 
 #[cfg(test)]
@@ -214,7 +230,7 @@ mod tests {
     #[test]
     fn the_sheet_that_covers_everything_goes_to_the_back() {
         let groups = [Group { sheet: 0, covering: 0b01, pixels: 10 }, Group { sheet: 1, covering: 0b11, pixels: 5 }];
-        for choice in [best(&groups, 2, None), greedy(&groups, 2, None)] {
+        for choice in [best(&groups, 2, &[(CHART, 0)]), greedy(&groups, 2, &[(CHART, 0)])] {
             assert_eq!((choice.order, choice.tests, choice.wrong), (vec![1, 0], CHART, 0));
         }
     }
@@ -223,9 +239,12 @@ mod tests {
     fn a_field_is_used_where_charts_cannot_tell() {
         // Both charts cover everything; the field of the first tells.
         let groups = [Group { sheet: 0, covering: 0x1_0003, pixels: 30 }, Group { sheet: 1, covering: 0b11, pixels: 20 }];
-        let choice = best(&groups, 2, Some(4));
+        let all = |price: u32| [(CHART, 0), (FIELD, price), (BOTH, price)];
+        let choice = best(&groups, 2, &all(4));
         assert_eq!((choice.order, choice.tests, choice.wrong, choice.cost), (vec![0, 1], FIELD, 0, 4));
         // Not where it costs more than it saves.
-        assert_eq!(best(&groups, 2, Some(50)).tests, CHART);
+        assert_eq!(best(&groups, 2, &all(50)).tests, CHART);
+        // Unless there is nothing else to choose.
+        assert_eq!(best(&groups, 2, &[(FIELD, 50)]).tests, FIELD);
     }
 }

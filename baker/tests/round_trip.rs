@@ -1,6 +1,7 @@
 //! From a G-buffer to bytes to pixels: two sheets, one moving in front of the other.
 
 use cubist_baker::atlas::{Label, SourceImage};
+use cubist_baker::bake::Coverage;
 use cubist_baker::encode::{self, CodingSettings, Content, Exceeded, Header};
 use cubist_baker::gbuffer::GBuffer;
 use cubist_baker::sheets::{self, KeyGrid, Layers};
@@ -50,7 +51,8 @@ fn bake_every(interval: u32, gbuffer: &GBuffer, image: &SourceImage, looping: bo
     let mut sheets = sheets::find(gbuffer, &grid, 1);
     let layers = Layers::of(&grid, &sheets);
     let fit = fit::solve(gbuffer, &grid, &sheets, &layers);
-    let mut evidence = order::Evidence { gbuffer, grid: &grid, image, layers: &layers, fit: &fit, fields: None, field_price: 4 };
+    let (field_price, coverage) = (4, Coverage::All);
+    let mut evidence = order::Evidence { gbuffer, grid: &grid, image, layers: &layers, fit: &fit, fields: None, field_price, coverage };
     order::sort(&evidence, &mut sheets);
     let fields = fields::solve(gbuffer, &grid, &sheets, &layers, image.labels.len());
     evidence.fields = Some(&fields);

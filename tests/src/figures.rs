@@ -28,7 +28,7 @@ pub fn widen(colour: u16) -> [u8; 3] {
 }
 
 /// For every label of `bundle` the label of `atlas` with the same chart: a folded surface has several (see `cubist_baker::folds`).
-fn charts(bundle: &Bundle<'_>, atlas: &Atlas) -> Vec<usize> {
+pub(crate) fn charts(bundle: &Bundle<'_>, atlas: &Atlas) -> Vec<usize> {
     let labels = &atlas.image.labels;
     let chart = |label: usize| {
         let own = bundle.label(label as u8);
@@ -74,6 +74,15 @@ pub fn quality(bytes: &[u8], atlas: &Atlas) -> Result<Quality> {
 #[must_use]
 pub fn psnr(squares: u64, values: usize) -> f64 {
     if squares == 0 { 99.0 } else { (10.0 * (255.0 * 255.0 * values as f64 / squares as f64).log10()).min(99.0) }
+}
+
+/// Bytes of the keys of a bundle, records and table, over its frames.
+///
+/// # Errors
+/// The bundle does not parse.
+pub fn key_bytes_per_frame(bytes: &[u8]) -> Result<f64> {
+    let bundle = Bundle::parse(bytes)?;
+    Ok((bundle.path().records.len() + bundle.path().table.len()) as f64 / f64::from(bundle.frames()))
 }
 
 /// Frames a second of the host playing every frame once, in order.

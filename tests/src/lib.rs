@@ -1,11 +1,15 @@
-//! What the tests and the tables share: scenes made small, bundles played whole, the f64 player, figures and goldens.
+//! What the tests and the tables share: scenes made small, bundles played whole, the f64 player, figures and goldens; and the tables
+//! themselves.
 //! Scenes come from the baker, bundles go through the core's player; the files beside `src` assert.
 
+pub mod codecs;
 pub mod figures;
 pub mod golden;
+pub mod partitions;
 pub mod play;
 pub mod reference;
 pub mod scenes;
+pub mod tables;
 
 /// The README's code compiles.
 #[cfg(doctest)]

@@ -190,20 +190,35 @@ impl<'a> Reference<'a> {
     /// Renders `frame`, row by row; `None` at pixels that no sheet shows at, of which a sound bundle has none.
     #[must_use]
     pub fn frame(&self, frame: u32, weights: Weights) -> Vec<Option<Pixel>> {
+        let mut picture = Vec::new();
+        self.each_pixel(frame, weights, |sheets, within| picture.push(self.pixel(sheets, within)));
+        picture
+    }
+
+    /// For every pixel of `frame`, row by row, the label and the position, texels, of each sheet of its cell, front to back, whether
+    /// or not it shows.
+    #[must_use]
+    pub fn candidates(&self, frame: u32, weights: Weights) -> Vec<Vec<(u8, [f64; 2])>> {
+        let mut all = Vec::new();
+        self.each_pixel(frame, weights, |sheets, within| {
+            all.push(sheets.iter().map(|sheet| (sheet.label, bilinear(&sheet.corners, within))).collect());
+        });
+        all
+    }
+
+    /// Calls `visit` for every pixel of `frame`, row by row, with the sheets of its cell and the place within the cell.
+    fn each_pixel(&self, frame: u32, weights: Weights, mut visit: impl FnMut(&[Sheet], [f64; 2])) {
         let moment = self.moment(frame, weights);
         let (width, height) = self.bundle.size();
         let size = 1u32 << self.grid.log2;
         let (columns, rows) = (self.grid.columns, self.grid.rows);
         let cells: Vec<Vec<Sheet>> = (0..columns * rows).map(|cell| self.sheets(&moment, cell % columns, cell / columns)).collect();
-        let mut picture = Vec::new();
         for y in 0..height {
             for x in 0..width {
                 let cell = (y / size) as usize * columns + (x / size) as usize;
-                let within = [x % size, y % size].map(|offset| f64::from(offset) / f64::from(size));
-                picture.push(self.pixel(&cells[cell], within));
+                visit(&cells[cell], [x % size, y % size].map(|offset| f64::from(offset) / f64::from(size)));
             }
         }
-        picture
     }
 
     /// The sheets of a cell, front to back, at one moment.

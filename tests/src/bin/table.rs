@@ -1,25 +1,27 @@
-//! Prints the project's tables: what scenes cost and how well they play, as Markdown or as one JSON document.
-//! Scenes come from the baker, figures from `cubist_tests::figures`; tables go to stdout, progress to stderr.
+//! Prints the project's tables, as Markdown or as one JSON document, or puts them into a document.
+//! Tables come from `cubist_tests::tables`; they go to stdout or the file, progress to stderr.
 
-use anyhow::{Context, Result, bail};
+use anyhow::Result;
 use clap::{Parser, Subcommand};
 use cubist_baker::bake::Settings;
-use cubist_baker::scene::{Overrides, Scene, builtin, load, load_builtin};
-use cubist_core::Bundle;
-use cubist_tests::{figures, scenes};
-use serde_json::{Value, json};
-use std::path::{Path, PathBuf};
-use std::time::Instant;
+use cubist_baker::scene::{Overrides, builtin, load, load_builtin};
+use cubist_tests::codecs::ffmpeg::Ffmpeg;
+use cubist_tests::tables::document::Document;
+use cubist_tests::tables::{self, Table, codecs, coverage};
+use std::path::PathBuf;
 
 /// Prints the tables of the README and the docs.
 #[derive(Parser)]
 #[command(name = "table")]
 struct Arguments {
     #[command(subcommand)]
-    table: Table,
+    table: Name,
     /// One JSON document instead of Markdown.
-    #[arg(long, global = true)]
+    #[arg(long, global = true, conflicts_with = "write")]
     json: bool,
+    /// Replaces the table in this document, between `<!-- table: NAME -->` and `<!-- /table -->`, instead of printing it.
+    #[arg(long, global = true, value_name = "FILE")]
+    write: Option<PathBuf>,
     /// Frames of every scene.
     #[arg(long, global = true)]
     frames: Option<u32>,
@@ -29,13 +31,26 @@ struct Arguments {
 }
 
 #[derive(Subcommand)]
-enum Table {
+enum Name {
     /// Every built-in scene at its own playback and default settings.
     Builtin,
     /// Every scene file (.toml) of a folder.
     Scenes {
         /// The folder.
         folder: PathBuf,
+    },
+    /// What telling surfaces apart is worth: from the way of 1998 to a perfect one.
+    Coverage {
+        /// Built-in scenes or scene files; left out: eight built-in ones.
+        scenes: Vec<String>,
+        /// Sides of a cell, pixels, a row of the table for each.
+        #[arg(long, value_name = "PX", value_delimiter = ',')]
+        cell: Vec<u32>,
+    },
+    /// Bytes beside those of other codecs at equal PSNR and SSIM (needs ffmpeg).
+    Codecs {
+        /// Built-in scenes or scene files; left out: four built-in ones.
+        scenes: Vec<String>,
     },
 }
 
@@ -45,99 +60,71 @@ fn size(text: &str) -> Result<(u32, u32), String> {
     Ok((number(width)?, number(height)?))
 }
 
-/// The columns: the key in JSON, the title, digits after the point.
-const COLUMNS: [(&str, &str, usize); 14] = [
-    ("scene", "scene", 0),
-    ("triangles", "triangles", 0),
-    ("bundle_bytes", "bundle", 0),
-    ("atlas_bytes", "source image", 0),
-    ("key_bytes_per_frame", "keys/frame", 1),
-    ("bytes_per_frame", "bytes/frame", 1),
-    ("psnr_mean", "PSNR mean", 2),
-    ("psnr_min", "PSNR min", 2),
-    ("wrong_surface_percent", "wrong %", 3),
-    ("memory_bytes", "memory", 0),
-    ("torn_percent", "torn %", 1),
-    ("bake_seconds", "bake s", 1),
-    ("host_frames_per_second", "host frames/s", 0),
-    ("labels", "labels", 0),
-];
-
-/// The figures of one scene.
-fn measure(scene: &Scene) -> Result<Value> {
-    eprintln!("{}: baking", scene.name);
-    let start = Instant::now();
-    let (flat, encoded) = scenes::bake(scene, &Settings::default())?;
-    let seconds = start.elapsed().as_secs_f64();
-    eprintln!("{}: playing", scene.name);
-    let bundle = Bundle::parse(&encoded.bundle).with_context(|| format!("parse the bundle of {}", scene.name))?;
-    let quality = figures::quality(&encoded.bundle, &flat.atlas)?;
-    let (atlas, path) = (bundle.atlas(), bundle.path());
-    let per_frame = |bytes: usize| bytes as f64 / f64::from(bundle.frames());
-    Ok(json!({
-        "scene": scene.name,
-        "size": [bundle.size().0, bundle.size().1],
-        "frames": bundle.frames(),
-        "triangles": scene.triangles.len(),
-        "labels": bundle.label_count(),
-        "bundle_bytes": encoded.bundle.len(),
-        "atlas_bytes": atlas.texels.len() + atlas.palette.len(),
-        "key_bytes_per_frame": per_frame(path.records.len() + path.table.len()),
-        "bytes_per_frame": per_frame(encoded.bundle.len()),
-        "psnr_mean": quality.psnr_mean,
-        "psnr_min": quality.psnr_min,
-        "wrong_surface_percent": quality.wrong_surface_percent,
-        "torn_percent": quality.torn_percent,
-        "memory_bytes": bundle.memory_needed(),
-        "bake_seconds": seconds,
-        "host_frames_per_second": figures::speed(&encoded.bundle, bundle.frames())?,
-    }))
+/// The scenes named, or these.
+fn or_default(named: &[String], default: &[&str]) -> Vec<String> {
+    if named.is_empty() { default.iter().map(|&name| name.to_owned()).collect() } else { named.to_vec() }
 }
 
-fn markdown(rows: &[Value]) -> String {
-    let cell = |row: &Value, &(key, _, digits): &(&str, &str, usize)| match &row[key] {
-        Value::String(text) => text.clone(),
-        number => format!("{:.digits$}", number.as_f64().unwrap_or(f64::NAN)),
-    };
-    let line = |cells: Vec<String>| format!("| {} |\n", cells.join(" | "));
-    let titles = line(COLUMNS.iter().map(|column| column.1.to_owned()).collect());
-    let rule = line(COLUMNS.iter().map(|column| if column.0 == "scene" { "---" } else { "---:" }.to_owned()).collect());
-    let body: String = rows.iter().map(|row| line(COLUMNS.iter().map(|column| cell(row, column)).collect())).collect();
-    titles + &rule + &body
+fn table(name: &Name, overrides: &Overrides) -> Result<Table> {
+    let mut rows = Vec::new();
+    Ok(match name {
+        Name::Builtin => {
+            for name in builtin::NAMES {
+                rows.push(tables::builtin::measure(&load_builtin(name, overrides)?)?);
+            }
+            tables::builtin::table(rows)
+        }
+        Name::Scenes { folder } => {
+            for file in tables::builtin::scene_files(folder)? {
+                rows.push(tables::builtin::measure(&load(&file, overrides)?)?);
+            }
+            tables::builtin::table(rows)
+        }
+        Name::Coverage { scenes, cell } => {
+            let cells = if cell.is_empty() { vec![Settings::default().cell] } else { cell.clone() };
+            let (size, frames) = (overrides.size.or(Some(coverage::SIZE)), overrides.frames.or(Some(coverage::FRAMES)));
+            let overrides = Overrides { size, frames, ..*overrides };
+            for name in or_default(scenes, &coverage::SCENES) {
+                rows.extend(coverage::measure(&tables::scene(&name, &overrides)?, &cells)?);
+            }
+            coverage::table(rows)
+        }
+        Name::Codecs { scenes } => {
+            let ffmpeg = Ffmpeg::find();
+            if ffmpeg.is_none() {
+                eprintln!("there is no ffmpeg, hence only a GIF to compare with; for all codecs install it: apt-get install ffmpeg");
+            }
+            for name in or_default(scenes, &codecs::SCENES) {
+                rows.extend(codecs::measure(&tables::scene(&name, overrides)?, ffmpeg.as_ref())?);
+            }
+            codecs::table(rows, ffmpeg.as_ref())
+        }
+    })
 }
 
-/// The scene files of a folder, by name.
-fn scene_files(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = std::fs::read_dir(folder).with_context(|| format!("read the folder {}", folder.display()))?;
-    let mut files = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>>>()?;
-    files.retain(|file| file.extension().is_some_and(|ending| ending == "toml"));
-    files.sort();
-    if files.is_empty() {
-        bail!("{}: no scene file (.toml) in this folder", folder.display());
+impl Name {
+    /// What stands in the table's marker.
+    fn marker(&self) -> &'static str {
+        match self {
+            Self::Builtin => "builtin",
+            Self::Scenes { .. } => "scenes",
+            Self::Coverage { .. } => "coverage",
+            Self::Codecs { .. } => "codecs",
+        }
     }
-    Ok(files)
 }
 
 fn main() -> Result<()> {
     let arguments = Arguments::parse();
+    let document = arguments.write.as_deref().map(|file| Document::open(file, arguments.table.marker())).transpose()?;
     let overrides = Overrides { size: arguments.size, frames: arguments.frames, ..Overrides::default() };
-    let mut rows = Vec::new();
-    match &arguments.table {
-        Table::Builtin => {
-            for name in builtin::NAMES {
-                rows.push(measure(&load_builtin(name, &overrides)?)?);
-            }
-        }
-        Table::Scenes { folder } => {
-            for file in scene_files(folder)? {
-                rows.push(measure(&load(&file, &overrides)?)?);
-            }
-        }
-    }
-    if arguments.json {
-        println!("{}", serde_json::to_string_pretty(&rows)?);
+    let table = table(&arguments.table, &overrides)?;
+    if let Some(document) = document {
+        document.write(&table.markdown)?;
+    } else if arguments.json {
+        println!("{}", serde_json::to_string_pretty(&table.json)?);
     } else {
-        print!("{}", markdown(&rows));
+        print!("{}", table.markdown);
     }
     Ok(())
 }

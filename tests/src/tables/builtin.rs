@@ -1,0 +1,87 @@
+//! The table of scenes: what each costs and how well it plays, at its own playback and default settings.
+//! Scenes come from the command `table`, figures from `figures`; the table goes back.
+
+use super::{Table, markdown, number};
+use crate::{figures, scenes};
+use anyhow::{Context, Result, bail};
+use cubist_baker::bake::Settings;
+use cubist_baker::scene::Scene;
+use cubist_core::Bundle;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// The columns: the key in JSON, the title, digits after the point.
+const COLUMNS: [(&str, &str, usize); 14] = [
+    ("scene", "scene", 0),
+    ("triangles", "triangles", 0),
+    ("bundle_bytes", "bundle", 0),
+    ("atlas_bytes", "source image", 0),
+    ("key_bytes_per_frame", "keys/frame", 1),
+    ("bytes_per_frame", "bytes/frame", 1),
+    ("psnr_mean", "PSNR mean", 2),
+    ("psnr_min", "PSNR min", 2),
+    ("wrong_surface_percent", "wrong %", 3),
+    ("memory_bytes", "memory", 0),
+    ("torn_percent", "torn %", 1),
+    ("bake_seconds", "bake s", 1),
+    ("host_frames_per_second", "host frames/s", 0),
+    ("labels", "labels", 0),
+];
+
+/// The figures of one scene.
+///
+/// # Errors
+/// The baker's.
+pub fn measure(scene: &Scene) -> Result<Value> {
+    eprintln!("{}: baking", scene.name);
+    let start = Instant::now();
+    let (flat, encoded) = scenes::bake(scene, &Settings::default())?;
+    let seconds = start.elapsed().as_secs_f64();
+    eprintln!("{}: playing", scene.name);
+    let bundle = Bundle::parse(&encoded.bundle).with_context(|| format!("parse the bundle of {}", scene.name))?;
+    let quality = figures::quality(&encoded.bundle, &flat.atlas)?;
+    let atlas = bundle.atlas();
+    Ok(json!({
+        "scene": scene.name,
+        "size": [bundle.size().0, bundle.size().1],
+        "frames": bundle.frames(),
+        "triangles": scene.triangles.len(),
+        "labels": bundle.label_count(),
+        "bundle_bytes": encoded.bundle.len(),
+        "atlas_bytes": atlas.texels.len() + atlas.palette.len(),
+        "key_bytes_per_frame": figures::key_bytes_per_frame(&encoded.bundle)?,
+        "bytes_per_frame": encoded.bundle.len() as f64 / f64::from(bundle.frames()),
+        "psnr_mean": quality.psnr_mean,
+        "psnr_min": quality.psnr_min,
+        "wrong_surface_percent": quality.wrong_surface_percent,
+        "torn_percent": quality.torn_percent,
+        "memory_bytes": bundle.memory_needed(),
+        "bake_seconds": seconds,
+        "host_frames_per_second": figures::speed(&encoded.bundle, bundle.frames())?,
+    }))
+}
+
+/// The table of the rows that [`measure`] gave.
+#[must_use]
+pub fn table(rows: Vec<Value>) -> Table {
+    let cell = |row: &Value, key: &str, digits: usize| row[key].as_str().map_or_else(|| number(&row[key], digits), str::to_owned);
+    let cells = |row: &Value| COLUMNS.iter().map(|&(key, _, digits)| cell(row, key, digits)).collect();
+    let lines: Vec<Vec<String>> = rows.iter().map(cells).collect();
+    Table { markdown: markdown(&COLUMNS.map(|column| column.1), 1, &lines), json: Value::from(rows) }
+}
+
+/// The scene files of a folder, by name.
+///
+/// # Errors
+/// The folder cannot be read, or has no scene file.
+pub fn scene_files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let entries = std::fs::read_dir(folder).with_context(|| format!("read the folder {}", folder.display()))?;
+    let mut files = entries.map(|entry| Ok(entry?.path())).collect::<Result<Vec<_>>>()?;
+    files.retain(|file| file.extension().is_some_and(|ending| ending == "toml"));
+    files.sort();
+    if files.is_empty() {
+        bail!("{}: no scene file (.toml) in this folder", folder.display());
+    }
+    Ok(files)
+}
