@@ -10,7 +10,7 @@ use crate::scene::Scene;
 use crate::sheets::{self, KeyGrid, Layers};
 use crate::trace::Tracer;
 use crate::verify::VerifyError;
-use crate::{fields, fit, order, tears};
+use crate::{fields, fit, order, tears, timing};
 use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC};
 use std::time::Instant;
 use thiserror::Error;
@@ -85,6 +85,8 @@ pub struct Settings {
     pub cell: u32,
     /// Frames between keys.
     pub key_interval: u32,
+    /// Keys stand closer where positions bend more from key to key, and at a path's ends; farther apart elsewhere.
+    pub adapt_keys: bool,
     /// How layers are interpolated between keys: one of the format's `TIME_` numbers.
     pub time: u8,
     /// How layers are interpolated between nodes: one of the format's `SPACE_` numbers.
@@ -106,6 +108,7 @@ impl Default for Settings {
         Self {
             cell: 8,
             key_interval: 8,
+            adapt_keys: true,
             time: TIME_CUBIC,
             space: SPACE_CUBIC,
             atlas: atlas::Settings::default(),
@@ -179,6 +182,8 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let Atlas { image, gbuffer, .. } = &flat.atlas;
     let cell_log2 = settings.cell.trailing_zeros() as u8;
     let grid = KeyGrid::new(gbuffer, cell_log2, settings.key_interval, scene.playback.looping, [settings.time, settings.space]);
+    let adapted = if settings.adapt_keys { timing::place(gbuffer, &grid) } else { None };
+    let grid = adapted.map_or(grid.clone(), |keys| grid.with_keys(keys));
     // In small cells and short intervals a few pixels are much.
     let volume = settings.cell * settings.cell * settings.key_interval;
     let least = if volume < 512 { settings.least_pixels.min(volume / 64).max(1) } else { settings.least_pixels };

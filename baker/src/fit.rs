@@ -20,7 +20,7 @@ const RUNS: usize = 8;
 
 /// How much a layer's place on its plane counts, in pixels: it costs no bytes to be there, and where few pixels see a layer nothing else
 /// tells where it should be.
-fn PRIOR() -> f64 { std::env::var("PRIOR").ok().and_then(|x| x.parse().ok()).unwrap_or(0.5) }
+const PRIOR: f64 = 0.5;
 
 /// A layer that is not there.
 const NOWHERE: u32 = u32::MAX;
@@ -131,7 +131,7 @@ where
     let mut held = vec![0.0f64; right.len()];
     for (layer, prior) in problem.prior.into_iter().flatten().enumerate() {
         if let Some((prior, sure)) = prior {
-            let weight = PRIOR() * f64::from(*sure);
+            let weight = PRIOR * f64::from(*sure);
             held[layer] = weight;
             diagonal[layer] += weight;
             for (right, prior) in right[layer].iter_mut().zip(prior) {

@@ -24,6 +24,7 @@ pub mod scene;
 pub mod shade;
 pub mod sheets;
 pub mod tears;
+pub mod timing;
 pub mod trace;
 pub mod truth;
 pub mod tune;

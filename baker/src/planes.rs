@@ -8,7 +8,8 @@ use crate::sheets::{KeyGrid, Layers};
 use cubist_core::plane::{Camera, Plane, Vector};
 use glam::DVec3;
 
-fn BEND() -> f64 { std::env::var("BEND").ok().and_then(|x| x.parse().ok()).unwrap_or(1.0) }
+/// A plane whose picture is off a straight line by this much from node to node, texels, counts half.
+const BEND: f64 = 1.0;
 /// Every this many pixels one is looked at.
 const SPARSE: usize = 7;
 /// A point farther than this from where its position says, texels, shows that a label is not flat.
@@ -95,7 +96,7 @@ pub fn positions(charts: &[Option<FlatChart>], layers: &Layers, lenses: &[Lens],
             let place = |chart: FlatChart| {
                 let [at, left, right, up, down] = directions.map(|direction| chart.seen(lens.eye, direction));
                 let at = at?;
-                let bend = |a: [f64; 2], b: [f64; 2]| (a[0] + b[0] - 2.0 * at[0]).hypot(a[1] + b[1] - 2.0 * at[1]) / BEND();
+                let bend = |a: [f64; 2], b: [f64; 2]| (a[0] + b[0] - 2.0 * at[0]).hypot(a[1] + b[1] - 2.0 * at[1]) / BEND;
                 let (across, along) = (bend(left?, right?), bend(up?, down?));
                 Some((at.map(|x| x as f32), (1.0 / (1.0 + across * across + along * along)) as f32))
             };

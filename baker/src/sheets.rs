@@ -39,10 +39,15 @@ impl KeyGrid {
             }
             keys.push(last);
         }
-        if let Ok(v) = std::env::var("KEYS") { if !looping { let e: Vec<u32> = v.split(',').map(|x| x.parse().unwrap()).collect(); for x in e { if x < gbuffer.frames { keys.push(x); } } keys.sort(); keys.dedup(); } }
         let size = [gbuffer.width as usize, gbuffer.height as usize];
         let grid = Grid::new(gbuffer.width as u16, gbuffer.height as u16, cell_log2);
         Self { grid, size, keys, frames: gbuffer.frames, looping, time, space }
+    }
+
+    /// The same grid with keys at other frames: ascending, the first 0, without a loop the last one the last frame.
+    #[must_use]
+    pub fn with_keys(&self, keys: Vec<u32>) -> Self {
+        Self { keys, ..self.clone() }
     }
 
     /// Key intervals: between each two keys, on a looping path also back to the first; a single key has one.
