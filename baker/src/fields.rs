@@ -55,7 +55,8 @@ pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers
             Thin::Down => strip(distances[2], distances[3], inside, reach),
         }
     };
-    let fitted = fit::solve_for(&Problem { grid, sheets, layers, time: TIME_LINEAR, space: SPACE_LINEAR, prior: None, target });
+    let fitted =
+        fit::solve_for(&Problem { grid, sheets, layers, time: TIME_LINEAR, space: SPACE_LINEAR, prior: None, known: None, target });
     let stored = |distance: f32| field_distance(field_code(libm::roundf(distance * 256.0) as i32)) as f32 / 256.0;
     let strip = thin.iter().map(|&thin| thin != Thin::No).collect();
     Fields { distance: fitted.uv.iter().map(|pair| pair.map(stored)).collect(), strip }

@@ -22,6 +22,14 @@ const RUNS: usize = 8;
 /// tells where it should be.
 const PRIOR: f64 = 0.5;
 
+/// A pixel this far off in the fit before, texels, counts half: it shows the wrong texel by now, and no worse where it is farther off, which
+/// it is where surfaces are seen at grazing angles or bend inside a cell. (Iteratively reweighted least squares, Cauchy's weights.)
+const ROBUST: f32 = 1.0;
+/// Fits with such weights after the first.
+const REFITS: usize = 2;
+/// Steps of each: they start near where they end.
+const REFIT_STEPS: usize = 25;
+
 /// A layer that is not there.
 const NOWHERE: u32 = u32::MAX;
 
@@ -96,6 +104,8 @@ pub struct Problem<'a, T> {
     pub space: u8,
     /// What layers are held to where pixels say little: a position for each; `None`: nothing.
     pub prior: Option<&'a [Option<([f32; 2], f32)>]>,
+    /// Values that a fit has already: pixels that are far from them count less. `None`: all count the same.
+    pub known: Option<&'a [[f32; 2]]>,
     /// The target and weight of a G-buffer pixel for the sheet at a place in the list of its cell (interval times cells plus cell);
     /// `None`: the sheet does not care.
     pub target: T,
@@ -117,7 +127,12 @@ pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers
         let own = gbuffer.label[pixel] == u16::from(sheets.lists[index][sheet]);
         own.then(|| (gbuffer.uv[pixel], 1.0))
     };
-    solve_for(&Problem { grid, sheets, layers, time: grid.time, space: grid.space, prior: Some(prior), target })
+    let problem = Problem { grid, sheets, layers, time: grid.time, space: grid.space, prior: Some(prior), known: None, target };
+    let mut fit = solve_for(&problem);
+    for _ in 0..REFITS {
+        fit = solve_for(&Problem { known: Some(&fit.uv), target, ..problem });
+    }
+    fit
 }
 
 /// Fits two quantities of all layers to the targets of `problem`.
@@ -126,7 +141,10 @@ pub fn solve_for<T>(problem: &Problem<'_, T>) -> Fit
 where
     T: Fn(usize, usize, usize) -> Option<([f32; 2], f32)> + Sync,
 {
-    let System { elements, mut right, mut diagonal, start } = assemble(problem);
+    let System { elements, mut right, mut diagonal, mut start } = assemble(problem);
+    if let Some(known) = problem.known {
+        start = known.iter().map(|uv| uv.map(f64::from)).collect();
+    }
     let weights = Weights::new(problem);
     let mut held = vec![0.0f64; right.len()];
     for (layer, prior) in problem.prior.into_iter().flatten().enumerate() {
@@ -146,7 +164,8 @@ where
             y[1] += held * x[1];
         }
     };
-    let uv = conjugate_gradients(&product, &right, &diagonal, start);
+    let steps = if problem.known.is_some() { REFIT_STEPS } else { STEPS };
+    let uv = conjugate_gradients(&product, &right, &diagonal, start, steps);
     Fit { uv: uv.iter().map(|uv| uv.map(|x| x as f32)).collect(), weight: diagonal.iter().map(|&d| d as f32).collect() }
 }
 
@@ -222,26 +241,30 @@ where
     let [columns, rows] = grid.pixels(place[1]);
     let frames = grid.frames_of(place[0]);
     let volume = (columns.len() * rows.len() * frames.len()) as f32;
-    let mut assembled: Vec<Assembled> = list
-        .iter()
-        .map(|&label| Assembled::new(&Patch::new(grid, problem.layers, place, label, [problem.time, problem.space]), place[0], volume))
-        .collect();
+    let patch = |&label: &u8| Patch::new(grid, problem.layers, place, label, [problem.time, problem.space]);
+    let patches: Vec<Patch> = list.iter().map(patch).collect();
+    let mut assembled: Vec<Assembled> = patches.iter().map(|patch| Assembled::new(patch, place[0], volume)).collect();
     let mut sums = vec![Vec::with_capacity(frames.len()); list.len()];
     for frame in frames {
+        let weights = grid.weights(place[0], frame, problem.time);
+        let known: Option<Vec<AtPoints>> = problem.known.map(|known| patches.iter().map(|patch| patch.points(known, &weights)).collect());
         let mut frame_sums = vec![(Sums::default(), [[0.0f32; 2]; POINTS], [0.0f32; 3]); list.len()];
         grid.each_pixel(frame, place[1], |pixel, at| {
-            let (points, weights) = patch::around(at);
+            let (points, shares) = patch::around(at);
             for (sheet, (sums, right, seen)) in frame_sums.iter_mut().enumerate() {
-                let Some(([u, v], weight)) = (problem.target)(index, sheet, pixel) else { continue };
-                sums.add(points[0] / 3 * 2 + points[0] % 3, weights, weight);
-                for (point, share) in points.into_iter().zip(weights) {
+                let Some(([u, v], mut weight)) = (problem.target)(index, sheet, pixel) else { continue };
+                if let Some(known) = &known {
+                    let [a, b] = patch::value(&known[sheet], (points, shares));
+                    weight /= 1.0 + ((a - u) * (a - u) + (b - v) * (b - v)) / (ROBUST * ROBUST);
+                }
+                sums.add(points[0] / 3 * 2 + points[0] % 3, shares, weight);
+                for (point, share) in points.into_iter().zip(shares) {
                     right[point][0] += weight * share * u;
                     right[point][1] += weight * share * v;
                 }
                 *seen = [seen[0] + weight * u, seen[1] + weight * v, seen[2] + weight];
             }
         });
-        let weights = grid.weights(place[0], frame, problem.time);
         for (sheet, (frame_sums, right, seen)) in frame_sums.into_iter().enumerate() {
             assembled[sheet].add(&frame_sums, &right, seen, &weights);
             sums[sheet].push(frame_sums);
@@ -441,6 +464,7 @@ fn conjugate_gradients(
     right: &[[f64; 2]],
     diagonal: &[f64],
     start: Vec<[f64; 2]>,
+    steps: usize,
 ) -> Vec<[f64; 2]> {
     let scaled = |r: &[[f64; 2]]| -> Vec<[f64; 2]> { r.iter().zip(diagonal).map(|(r, d)| [r[0] / d, r[1] / d]).collect() };
     let mut x = start;
@@ -451,7 +475,7 @@ fn conjugate_gradients(
     let mut direction = z.clone();
     let mut rz = dot(&residual, &z);
     let ratio = |a: f64, b: f64| if b.abs() > 1e-30 { a / b } else { 0.0 };
-    for _ in 0..STEPS {
+    for _ in 0..steps {
         multiply(&direction, &mut product);
         let curvature = dot(&direction, &product);
         let step = [ratio(rz[0], curvature[0]), ratio(rz[1], curvature[1])];
