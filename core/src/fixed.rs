@@ -92,16 +92,16 @@ pub const fn middle(before: Option<i32>, from: i32, to: i32, after: Option<i32>)
 }
 
 /// The largest size of a field code, which stands for 128 pixels.
-pub const MAX_FIELD: i32 = 37;
+pub const MAX_FIELD: i32 = 73;
 
 /// The distance that field code `code` stands for, Q8 pixels: four steps an octave from 1/4 pixel, with a sign; 0 is 0.
 #[must_use]
 pub fn field_distance(code: i8) -> i32 {
-    // 64 * 2^(i / 4).
-    const STEPS: [i32; 4] = [64, 76, 91, 108];
+    // 64 * 2^(i / 8).
+    const STEPS: [i32; 8] = [64, 70, 76, 83, 91, 99, 108, 117];
     let size = u32::from(code.unsigned_abs()).min(MAX_FIELD as u32);
     let Some(index) = size.checked_sub(1) else { return 0 };
-    let distance = STEPS.get(index as usize & 3).copied().unwrap_or(0).wrapping_shl(index >> 2);
+    let distance = STEPS.get(index as usize & 7).copied().unwrap_or(0).wrapping_shl(index >> 3);
     if code < 0 { distance.wrapping_neg() } else { distance }
 }
 
