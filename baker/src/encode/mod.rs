@@ -27,8 +27,8 @@ use range::Encoder;
 pub struct CodingSettings {
     /// Coordinates are stored in steps of 2^this of their units: 1/64 texel, 1/32 where the picture is wider or higher than 512 texels.
     pub step_log2: u8,
-    /// What a bit is worth, in squared texels of error summed over pixels, when residuals of ghosts are
-    /// rounded towards zero; 0 keeps them all.
+    /// What a bit is worth, in squared texels of error summed over pixels, when residuals are rounded towards zero; 0 keeps
+    /// them all.
     pub lambda: f32,
     /// Every this many keys one that needs no earlier one; bounds what a seek decodes.
     pub independent_every: usize,
@@ -46,7 +46,7 @@ pub struct Header<'a> {
 /// Everything that becomes a bundle.
 #[derive(Clone, Copy)]
 pub struct Content<'a> {
-    /// What is really seen; it tells visible layers from ghosts.
+    /// What is really seen.
     pub gbuffer: &'a GBuffer,
     /// The key-ray grid.
     pub grid: &'a KeyGrid,
@@ -246,18 +246,6 @@ struct Wanted<'a> {
     key: usize,
 }
 
-impl Wanted<'_> {
-    /// Whether the node's own ray sees `label` at the key.
-    fn visible(&self, node: usize, label: u8) -> bool {
-        let size = 1usize << self.content.grid.grid.log2;
-        let width = self.content.grid.grid.node_columns();
-        let x = (node % width * size).min(self.content.grid.size[0] - 1);
-        let y = (node / width * size).min(self.content.grid.size[1] - 1);
-        let frame = self.content.grid.keys[self.key] as usize;
-        self.content.gbuffer.label[(frame * self.content.grid.size[1] + y) * self.content.grid.size[0] + x] == u16::from(label)
-    }
-}
-
 impl Source for Wanted<'_> {
     fn sheets(&mut self, ahead: bool, cell: usize) -> lists::Sheets {
         let intervals = self.content.grid.intervals();
@@ -276,7 +264,7 @@ impl Source for Wanted<'_> {
         let Some(layer) = self.content.layers.find(self.key * self.content.grid.grid.nodes() + node, label) else { return [0, 0] };
         let unit = (1u32 << key_bits(self.content.image)) as f32;
         let step = (1u32 << self.settings.step_log2) as f32 / unit;
-        let free = self.settings.lambda > 0.0 && !self.visible(node, label);
+        let free = self.settings.lambda > 0.0;
         let mut residual = [0, 0];
         for axis in 0..2 {
             let wanted = self.content.fit.uv[layer][axis].clamp(KEY_MIN as f32 / unit, KEY_MAX as f32 / unit);
@@ -286,7 +274,7 @@ impl Source for Wanted<'_> {
             if !free || nearest == 0 {
                 continue;
             }
-            // A ghost is seen through interpolation only: what its exact value gains is weighed against its bits.
+            // What the exact value gains the pixels that look at the layer is weighed against its bits; ghosts have few such pixels.
             let cost = |value: i32| {
                 let error = (value as f32 - exact) * step;
                 self.content.fit.weight[layer] * error * error + self.settings.lambda * range::price(contexts[axis], value) as f32
