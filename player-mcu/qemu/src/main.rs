@@ -105,9 +105,8 @@ fn play(bundle: &Bundle<'_>, memory: &mut [u8], row: &mut [u16], clock: &mut Clo
     for frame in 0..bundle.frames() {
         let seek = clock.measure(|| player.seek(Frame(frame)));
         // The clock counts a few million: that may be less than a frame.
-        let quarters = [0, 1, 2, 3].map(|quarter| height * quarter / 4..height * (quarter + 1) / 4);
-        let drawing: u32 = quarters
-            .into_iter()
+        let parts = (0..16).map(|part| height * part / 16..height * (part + 1) / 16);
+        let drawing: u32 = parts
             .map(|part| {
                 clock.measure(|| {
                     for y in part {
