@@ -23,9 +23,61 @@ impl Layer {
 
     /// Halfway between `from` and `to`, given what comes before and after on the same line (see [`middle`]).
     #[must_use]
-    pub fn middle(before: Option<Self>, from: Self, to: Self, after: Option<Self>) -> Self {
-        let axis = |get: fn(Self) -> i32| middle(before.map(get), get(from), get(to), after.map(get));
-        Self { u: axis(|layer| layer.u), v: axis(|layer| layer.v) }
+    #[inline]
+    pub const fn middle(before: Option<Self>, from: Self, to: Self, after: Option<Self>) -> Self {
+        // One decision for both axes.
+        match (before, after) {
+            (Some(b), Some(a)) => {
+                Self { u: middle(Some(b.u), from.u, to.u, Some(a.u)), v: middle(Some(b.v), from.v, to.v, Some(a.v)) }
+            }
+            (Some(b), None) => Self { u: middle(Some(b.u), from.u, to.u, None), v: middle(Some(b.v), from.v, to.v, None) },
+            (None, Some(a)) => Self { u: middle(None, from.u, to.u, Some(a.u)), v: middle(None, from.v, to.v, Some(a.v)) },
+            (None, None) => Self { u: middle(None, from.u, to.u, None), v: middle(None, from.v, to.v, None) },
+        }
+    }
+}
+
+/// Looks up labels in one row of nodes, node by node from left to right.
+#[derive(Clone, Debug)]
+pub struct Walk<'w> {
+    ends: core::slice::Iter<'w, u16>,
+    labels: &'w [u8],
+    from: usize,
+    to: usize,
+}
+
+impl<'w> Walk<'w> {
+    /// A walk over nodes whose layers start at `starts`, with one entry more than there are nodes; before the first of them.
+    fn new(starts: &'w [u16], labels: &'w [u8]) -> Self {
+        let mut ends = starts.iter();
+        let to = ends.next().map_or(0, |&at| usize::from(at));
+        Self { ends, labels, from: to, to }
+    }
+
+    /// On to the next node; past the last there is one without layers.
+    #[inline]
+    pub fn step(&mut self) {
+        self.from = self.to;
+        if let Some(&end) = self.ends.next() {
+            self.to = usize::from(end);
+        }
+    }
+
+    /// The index of the node's layer of `label`.
+    #[must_use]
+    #[inline(always)]
+    pub fn find(&self, label: u8) -> Option<usize> {
+        if self.from < self.to && self.labels.get(self.from) == Some(&label) {
+            return Some(self.from);
+        }
+        self.search(label)
+    }
+
+    /// As `find`, where the label is not the first.
+    #[inline(never)]
+    fn search(&self, label: u8) -> Option<usize> {
+        let labels = self.labels.get(self.from..self.to)?;
+        labels.iter().position(|&other| other == label).map(|place| self.from.wrapping_add(place))
     }
 }
 
@@ -43,10 +95,11 @@ pub struct Around<'k, 'm> {
 }
 
 impl Around<'_, '_> {
-    /// The layer of `label` at `node`, whose indices in the interval's two keys are known.
-    fn blend(&self, node: usize, label: u8, [from, to]: [usize; 2], weights: &WeightSet) -> PlayUv {
-        let outer = |key: Option<&Key<'_>>| key.and_then(|key| Some(key.uv(key.find(node, label)?)));
-        let (before, after) = (outer(self.before), outer(self.after));
+    /// The position at a moment of a layer that the interval's two keys have as `from` and `to`, those around it as `before` and `after`.
+    #[inline(always)]
+    fn blend(&self, [before, after]: [Option<usize>; 2], [from, to]: [usize; 2], weights: &WeightSet) -> PlayUv {
+        let outer = |key: Option<&Key<'_>>, index: Option<usize>| key.zip(index).map(|(key, index)| key.uv(index));
+        let (before, after) = (outer(self.before, before), outer(self.after, after));
         let [both, no_first, no_last, neither] = weights;
         let weights = match (before, after) {
             (Some(_), Some(_)) => both,
@@ -71,6 +124,18 @@ impl Around<'_, '_> {
     }
 }
 
+/// A walk over the `columns` nodes of `key` from node `first` on; over none without a key.
+fn enter<'k>(key: Option<&'k Key<'_>>, first: usize, columns: usize) -> Walk<'k> {
+    let starts = key.and_then(|key| Some((key.start.get(first..=first.wrapping_add(columns))?, &*key.label)));
+    let (starts, labels) = starts.unwrap_or((&[], &[]));
+    Walk::new(starts, labels)
+}
+
+/// No layer: see [`NodeRow::right`].
+const NONE: u16 = 0x7fff;
+/// A layer of the same label is at the node to the left.
+const LEFT: u16 = 0x8000;
+
 /// One row of nodes at one moment, in caller's memory.
 #[derive(Debug)]
 pub struct NodeRow<'m> {
@@ -80,6 +145,10 @@ pub struct NodeRow<'m> {
     pub label: &'m mut [u8],
     /// Positions, Q15.16 texels.
     pub layer: &'m mut [Layer],
+    /// Each layer's partner: which layer of the node to the right has the same label, [`NONE`] if none has; and [`LEFT`].
+    pub right: &'m mut [u16],
+    /// Where space is cubic, the positions halfway between each layer and its partner.
+    pub middle: &'m mut [Layer],
     /// Fields, Q8 pixels; empty where the bundle has none.
     pub field: &'m mut [[i16; 2]],
 }
@@ -87,56 +156,129 @@ pub struct NodeRow<'m> {
 impl NodeRow<'_> {
     /// Fills the row with the layers that both ends of the interval carry in row `row` of the grid's nodes, weighted; with none
     /// outside the grid. Returns how many there are.
+    #[inline(never)]
     pub fn fill(&mut self, grid: Grid, row: Option<usize>, keys: &Around<'_, '_>, moment: &Moment) -> u32 {
         let Some(row) = row.filter(|&row| row < grid.node_rows()) else {
             self.start.fill(0);
             return 0;
         };
         let (weights, linear) = (&moment.weights, moment.linear);
-        let first = row.wrapping_mul(grid.node_columns());
+        let columns = grid.node_columns();
+        let first = row.wrapping_mul(columns);
+        let (mut from, mut to) = (enter(Some(keys.from), first, columns), enter(Some(keys.to), first, columns));
+        let (mut before, mut after) = (enter(keys.before, first, columns), enter(keys.after, first, columns));
         let mut count = 0usize;
-        for column in 0..grid.node_columns() {
+        for column in 0..columns {
             self.begin(column, count);
-            let node = first.wrapping_add(column);
-            let (mut index, labels) = keys.from.node(node);
-            for &label in labels {
-                if let Some(other) = keys.to.find(node, label) {
-                    let uv = keys.blend(node, label, [index, other], weights);
-                    count = self.put(count, label, Layer { u: uv.u, v: uv.v }, || keys.field([index, other], linear));
+            for walk in [&mut from, &mut to, &mut before, &mut after] {
+                walk.step();
+            }
+            for index in from.from..from.to {
+                let Some(&label) = keys.from.label.get(index) else { break };
+                if let Some(other) = to.find(label) {
+                    let both = [index, other];
+                    let uv = keys.blend([before.find(label), after.find(label)], both, weights);
+                    count = self.put(count, label, Layer { u: uv.u, v: uv.v }, || keys.field(both, linear));
                 }
-                index = index.wrapping_add(1);
             }
         }
-        self.begin(grid.node_columns(), count);
+        self.begin(columns, count);
+        self.link(columns);
         count as u32
     }
 
     /// Fills the row with what lies halfway between rows `from` and `to`, where both carry it; `before` and `after` are the rows
     /// around these. Returns how many layers there are.
+    #[inline(never)]
     pub fn between(&mut self, columns: usize, [before, from, to, after]: [&NodeRow<'_>; 4]) -> u32 {
         let mut count = 0usize;
+        let [mut first, mut upper, mut lower, mut last] = [before, from, to, after].map(NodeRow::walk);
         for column in 0..columns {
             self.begin(column, count);
-            let (mut index, labels) = from.node(column);
-            for &label in labels {
-                if let Some(below) = to.find(column, label) {
-                    let (first, last) = (before.find(column, label), after.find(column, label));
-                    let layer = Layer::middle(
-                        first.map(|at| before.layer(at)),
-                        from.layer(index),
-                        to.layer(below),
-                        last.map(|at| after.layer(at)),
-                    );
+            for walk in [&mut first, &mut upper, &mut lower, &mut last] {
+                walk.step();
+            }
+            for index in upper.from..upper.to {
+                let Some(&label) = from.label.get(index) else { break };
+                if let Some(below) = lower.find(label) {
+                    let outer = |row: &NodeRow<'_>, at: Option<usize>| at.and_then(|at| row.layer.get(at).copied());
+                    let (above, under) = (outer(before, first.find(label)), outer(after, last.find(label)));
+                    let (Some(&here), Some(&there)) = (from.layer.get(index), to.layer.get(below)) else { break };
                     // Fields are straight from node to node: nothing asks for them here.
-                    count = self.put(count, label, layer, || [0; 2]);
+                    count = self.put(count, label, Layer::middle(above, here, there, under), || [0; 2]);
                 }
-                index = index.wrapping_add(1);
             }
         }
         self.begin(columns, count);
+        self.link(columns);
         count as u32
     }
 
+    /// A walk over the row's nodes.
+    #[must_use]
+    pub fn walk(&self) -> Walk<'_> {
+        Walk::new(self.start, self.label)
+    }
+
+    /// Finds every layer's partner and, where there is room for them, what lies halfway to it.
+    #[inline(never)]
+    fn link(&mut self, columns: usize) {
+        let at = |column: usize, start: &[u16]| start.get(column).map_or(0, |&at| usize::from(at));
+        let (mut from, mut next) = (at(0, self.start), at(1, self.start));
+        let mut nodes = Walk::new(self.start, self.label);
+        nodes.step();
+        for column in 0..columns {
+            let end = next;
+            nodes.step();
+            for index in from..end {
+                let Some(&label) = self.label.get(index) else { break };
+                // Indices that do not fit are no partners.
+                let partner = if column.wrapping_add(1) < columns { nodes.find(label).filter(|&at| at < usize::from(NONE)) } else { None };
+                if let Some(partner) = partner {
+                    if let Some(link) = self.right.get_mut(index) {
+                        *link = *link & LEFT | partner as u16;
+                    }
+                    if let Some(link) = self.right.get_mut(partner) {
+                        *link |= LEFT;
+                    }
+                }
+            }
+            (from, next) = (end, nodes.to);
+        }
+        if !self.middle.is_empty() {
+            for index in 0..from {
+                if self.right.get(index).is_some_and(|link| link & LEFT == 0) {
+                    self.halve(index);
+                }
+            }
+        }
+    }
+
+    /// Works out the middles along the chain of partners that starts at layer `index`.
+    fn halve(&mut self, mut index: usize) {
+        let (mut before, mut from) = (None, self.layer(index as u16));
+        let mut partner = self.right(index);
+        let mut to = partner.map(|at| self.layer(at as u16));
+        while let (Some(next), Some(there)) = (partner, to) {
+            let beyond = self.right(next);
+            let after = beyond.map(|at| self.layer(at as u16));
+            if let Some(slot) = self.middle.get_mut(index) {
+                *slot = Layer::middle(before, from, there, after);
+            }
+            (before, from, to) = (Some(from), there, after);
+            (index, partner) = (next, beyond);
+        }
+    }
+
+    /// The partner of layer `index`: the layer of the same label at the node to the right.
+    #[must_use]
+    #[inline]
+    pub fn right(&self, index: usize) -> Option<usize> {
+        let link = self.right.get(index).copied().unwrap_or(NONE) & !LEFT;
+        (link != NONE).then_some(usize::from(link))
+    }
+
+    #[inline]
     fn begin(&mut self, column: usize, count: usize) {
         if let Some(start) = self.start.get_mut(column) {
             *start = count as u16;
@@ -144,38 +286,38 @@ impl NodeRow<'_> {
     }
 
     /// Puts a layer at `count`, if there is room; its fields where the bundle has such. Returns where the next one goes.
+    #[inline]
     fn put(&mut self, count: usize, label: u8, layer: Layer, field: impl FnOnce() -> [i16; 2]) -> usize {
-        let Some((label_slot, layer_slot)) = self.label.get_mut(count).zip(self.layer.get_mut(count)) else { return count };
-        (*label_slot, *layer_slot) = (label, layer);
+        let (Some(label_slot), Some(layer_slot), Some(link)) =
+            (self.label.get_mut(count), self.layer.get_mut(count), self.right.get_mut(count))
+        else {
+            return count;
+        };
+        (*label_slot, *layer_slot, *link) = (label, layer, NONE);
         if let Some(slot) = self.field.get_mut(count) {
             *slot = field();
         }
         count.wrapping_add(1)
     }
 
-    /// The index of the first layer of the node in `column` and the labels of its layers.
-    fn node(&self, column: usize) -> (u16, &[u8]) {
-        let at = |column: usize| self.start.get(column).copied().unwrap_or(0);
-        let (from, to) = (at(column), at(column.wrapping_add(1)));
-        (from, self.label.get(usize::from(from)..usize::from(to)).unwrap_or(&[]))
-    }
-
-    /// The index of the layer of `label` at the node in `column`.
-    #[must_use]
-    pub fn find(&self, column: usize, label: u8) -> Option<u16> {
-        let (from, labels) = self.node(column);
-        labels.iter().position(|&l| l == label).map(|place| from.wrapping_add(place as u16))
-    }
-
     /// The fields of layer `index`; those of one that shows everywhere where the bundle has none.
     #[must_use]
+    #[inline]
     pub fn field(&self, index: u16) -> [i16; 2] {
         self.field.get(usize::from(index)).copied().unwrap_or([1, 1])
     }
 
     /// Layer `index`.
     #[must_use]
+    #[inline]
     pub fn layer(&self, index: u16) -> Layer {
         self.layer.get(usize::from(index)).copied().unwrap_or_default()
+    }
+
+    /// What lies halfway from layer `index` to its partner.
+    #[must_use]
+    #[inline]
+    pub fn halfway(&self, index: u16) -> Layer {
+        self.middle.get(usize::from(index)).copied().unwrap_or_default()
     }
 }

@@ -1,11 +1,101 @@
-//! Spans: the inner loops. A span is one sheet along one row of pixels of a cell.
-//! Its ends come from `cell`; pixels go to the caller's row.
+//! Spans: the inner loops. Pixels of a row are made from positions that step along it: in runs of blocks that show one sheet each, or
+//! block by block where several sheets take turns. What is where comes from `plan`; pixels go to the caller's row.
 
 use crate::atlas::Texture;
-use crate::coverage::Chart;
+use crate::coverage::{Chart, Cover};
 use crate::fixed::PlayUv;
+use crate::plan::{Edge, halves};
+use crate::sheet::Corners;
 
-/// A sheet along a row of a cell: the position at its first pixel, and the step to the next.
+/// A position in a window: v in its lower WIDTH + ROWS bits, WIDTH of them its fraction, u above, its upper WIDTH bits the texel.
+#[derive(Clone, Copy, Debug)]
+pub struct Packed<const WIDTH: u32, const ROWS: u32>(pub u32);
+
+impl<const WIDTH: u32, const ROWS: u32> Packed<WIDTH, ROWS> {
+    const BITS: u32 = WIDTH + ROWS;
+    const LOW: u32 = (1 << Self::BITS) - 1;
+    /// How far an edge's v is shifted down.
+    const DROP: u32 = 31 - Self::BITS;
+
+    #[inline(always)]
+    const fn new([u, v]: [u32; 2]) -> Self {
+        Self((u & !Self::LOW) | v >> Self::DROP)
+    }
+
+    /// A step of `u` and `v`, as edges count them, rounded to nearest.
+    #[inline(always)]
+    const fn step(u: i32, v: i32) -> u32 {
+        let [half_u, half_v] = halves(WIDTH, ROWS);
+        let u = u.wrapping_add(half_u as i32) as u32 & !Self::LOW;
+        u.wrapping_add((v.wrapping_add(half_v as i32) >> Self::DROP) as u32)
+    }
+
+    /// The texel's place in its window, below 2^(WIDTH + ROWS).
+    #[must_use]
+    #[inline(always)]
+    pub const fn texel(self) -> usize {
+        (self.0 >> (32 - WIDTH) | self.0 & (Self::LOW & !((1 << WIDTH) - 1))) as usize
+    }
+
+    /// The position in the picture, for a window from `row` on.
+    #[must_use]
+    pub fn at(self, row: u16) -> PlayUv {
+        let u = (self.0 >> Self::BITS).wrapping_shl(Self::BITS.wrapping_add(WIDTH).wrapping_sub(16));
+        let v = (self.0 & Self::LOW).wrapping_shl(16 - WIDTH).wrapping_add(u32::from(row).wrapping_shl(16));
+        PlayUv { u: u as i32, v: v as i32 }
+    }
+}
+
+/// Paints `out`, a run's blocks of `PIXELS` pixels each, and steps its edges down a row.
+#[inline(always)]
+pub fn run<T, const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(
+    edges: &mut [Edge],
+    out: &mut [T],
+    make: impl Fn(Packed<WIDTH, ROWS>) -> T,
+) {
+    let mut edges = edges.iter_mut();
+    let Some(mut left) = edges.next().map(Edge::advance) else { return };
+    for (edge, pixels) in edges.zip(out.as_chunks_mut::<PIXELS>().0) {
+        let right = edge.advance();
+        let across = |from: u32, to: u32| to.wrapping_sub(from) as i32 >> PIXELS.trailing_zeros();
+        let step = Packed::<WIDTH, ROWS>::step(across(left[0], right[0]), across(left[1], right[1]));
+        let Packed(mut at) = Packed::<WIDTH, ROWS>::new(left);
+        for pixel in pixels {
+            *pixel = make(Packed(at));
+            at = at.wrapping_add(step);
+        }
+        left = right;
+    }
+}
+
+/// Like [`run`], with blocks of 2^`log2` pixels, eight at least: every four the position is packed anew, so that steps' rounding does not add up.
+#[inline(always)]
+pub fn long_run<T, const WIDTH: u32, const ROWS: u32>(
+    edges: &mut [Edge],
+    out: &mut [T],
+    log2: u32,
+    make: impl Fn(Packed<WIDTH, ROWS>) -> T,
+) {
+    let mut edges = edges.iter_mut();
+    let Some(mut left) = edges.next().map(Edge::advance) else { return };
+    for (edge, pixels) in edges.zip(out.chunks_exact_mut(1 << log2)) {
+        let right = edge.advance();
+        let across = |from: u32, to: u32| to.wrapping_sub(from) as i32 >> log2;
+        let [u, v] = [across(left[0], right[0]), across(left[1], right[1])];
+        let step = Packed::<WIDTH, ROWS>::step(u, v);
+        for four in pixels.as_chunks_mut::<4>().0 {
+            let Packed(mut at) = Packed::<WIDTH, ROWS>::new(left);
+            for pixel in four {
+                *pixel = make(Packed(at));
+                at = at.wrapping_add(step);
+            }
+            left = [left[0].wrapping_add((u as u32).wrapping_shl(2)), left[1].wrapping_add((v as u32).wrapping_shl(2))];
+        }
+        left = right;
+    }
+}
+
+/// A sheet along a row of a block: the position at its first pixel, and the step to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Span {
     /// At the first pixel.
@@ -14,19 +104,29 @@ pub struct Span {
     pub step: PlayUv,
 }
 
+/// The value `step` / 2^`log2` of the way from `from` to `to`, rounded down.
+const fn down(from: i32, to: i32, step: u32, log2: u32) -> i32 {
+    // In two parts, because the product does not fit.
+    let far = to.wrapping_sub(from);
+    let rest = far & 1i32.wrapping_shl(log2).wrapping_sub(1);
+    let step = step as i32;
+    from.wrapping_add((far >> log2).wrapping_mul(step)).wrapping_add(rest.wrapping_mul(step) >> log2)
+}
+
 impl Span {
-    /// The span between the cell's left edge and its right edge, 2^`log2` pixels further; steps rounded to
-    /// nearest, so that the last pixel is at most 2^(log2 - 1) / 65536 texel off.
+    /// The span of row `row` of a block of 2^`log2` pixels, whose corners are given; steps rounded to nearest, so that the last pixel is at
+    /// most 2^(log2 - 1) / 65536 texel off.
     #[must_use]
-    pub const fn between(from: PlayUv, to: PlayUv, log2: u32) -> Self {
+    #[inline]
+    pub const fn new([a, b, c, d]: Corners, row: u32, log2: u32) -> Self {
+        let from = PlayUv { u: down(a.u, c.u, row, log2), v: down(a.v, c.v, row, log2) };
+        let to = PlayUv { u: down(b.u, d.u, row, log2), v: down(b.v, d.v, row, log2) };
         let half = (1i32 << log2) >> 1;
-        Self {
-            from,
-            step: PlayUv {
-                u: to.u.wrapping_sub(from.u).wrapping_add(half) >> log2,
-                v: to.v.wrapping_sub(from.v).wrapping_add(half) >> log2,
-            },
-        }
+        let step = PlayUv {
+            u: to.u.wrapping_sub(from.u).wrapping_add(half) >> log2,
+            v: to.v.wrapping_sub(from.v).wrapping_add(half) >> log2,
+        };
+        Self { from, step }
     }
 
     /// The position `pixels` pixels on.
@@ -45,25 +145,20 @@ impl PlayUv {
     }
 }
 
-/// Paints every pixel of `out`; `make` turns a position into a pixel. Positions outside the picture count as its edge.
+/// Paints the pixels of `out` that `left` names, a bit each; `make` turns a position into a pixel. Positions outside the picture count as its edge.
 #[inline(always)]
-pub fn all<T>(out: &mut [T], span: Span, texture: &Texture<'_>, make: impl Fn(PlayUv) -> T) {
+pub fn rest<T>(out: &mut [T], mut left: u32, span: Span, texture: &Texture<'_>, make: impl Fn(PlayUv) -> T) {
     let mut uv = span.from;
-    // A span is straight: if both its ends are inside, all of it is.
-    if texture.holds(uv) && texture.holds(span.at(out.len())) {
-        for pixel in out {
-            *pixel = make(uv);
-            uv = uv.plus(span.step);
-        }
-    } else {
-        for pixel in out {
+    for pixel in out {
+        if left & 1 != 0 {
             *pixel = make(texture.clamp(uv));
-            uv = uv.plus(span.step);
         }
+        left >>= 1;
+        uv = uv.plus(span.step);
     }
 }
 
-/// A sheet's fields along a row of a cell.
+/// A sheet's fields along a row of a block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fields {
     from: [i32; 2],
@@ -71,19 +166,19 @@ pub struct Fields {
 }
 
 impl Fields {
-    /// The fields between a cell's left edge and its right edge, 2^`log2` pixels further, Q16 pixels.
+    /// The fields of row `row` of a cell of 2^`log2` pixels from pixel `first` on, given those at the cell's corners, Q16 pixels.
     #[must_use]
-    pub const fn between([a, b]: [i32; 2], [c, d]: [i32; 2], log2: u32) -> Self {
+    #[inline]
+    pub fn new([a, b, c, d]: [[i32; 2]; 4], row: u32, log2: u32, first: u32) -> Self {
         let half = (1i32 << log2) >> 1;
-        let step = [c.wrapping_sub(a).wrapping_add(half) >> log2, d.wrapping_sub(b).wrapping_add(half) >> log2];
-        Self { from: [a, b], step }
-    }
-
-    /// The same fields from `pixels` pixels on.
-    #[must_use]
-    pub const fn after(self, pixels: i32) -> Self {
-        let ([a, b], [da, db]) = (self.from, self.step);
-        Self { from: [a.wrapping_add(da.wrapping_mul(pixels)), b.wrapping_add(db.wrapping_mul(pixels))], step: self.step }
+        let axis = |a: i32, b: i32, c: i32, d: i32| {
+            let (from, to) = (down(a, c, row, log2), down(b, d, row, log2));
+            let step = to.wrapping_sub(from).wrapping_add(half) >> log2;
+            [from.wrapping_add(step.wrapping_mul(first as i32)), step]
+        };
+        let ([a0, a1], [b0, b1], [c0, c1], [d0, d1]) = (a, b, c, d);
+        let ([from, step], [other, other_step]) = (axis(a0, b0, c0, d0), axis(a1, b1, c1, d1));
+        Self { from: [from, other], step: [step, other_step] }
     }
 }
 
@@ -100,16 +195,26 @@ pub struct Test<'t> {
     pub texture: Texture<'t>,
 }
 
-/// Paints the pixels of `out` at which `test` lets the span show.
+/// Paints those pixels of `out` that `left` names, a bit each, and at which `test` lets the span show; takes them off `left`.
 #[inline(always)]
-pub fn covered<T>(out: &mut [T], span: Span, test: &Test<'_>, make: impl Fn(PlayUv) -> T) {
+pub fn covered<T>(out: &mut [T], left: &mut u32, span: Span, test: &Test<'_>, make: impl Fn(PlayUv) -> T) {
+    // A span is straight: what holds at both its ends holds in between.
+    let ends = [span.from, span.at(out.len().wrapping_sub(1))];
+    let chart = match test.chart.map(|chart| (chart, chart.cover(&ends))) {
+        Some((_, Cover::Nothing)) => return,
+        Some((_, Cover::All)) | None => None,
+        Some((chart, Cover::Part)) => Some(chart),
+    };
     let mut uv = span.from;
     let Fields { from: [mut a, mut b], step: [da, db] } = test.fields.unwrap_or(Fields { from: [1, 1], step: [0, 0] });
+    let mut bit = 1u32;
     for pixel in out {
-        let inside = a > 0 && (!test.strip || b > 0);
-        if inside && test.chart.is_none_or(|chart| chart.covers(uv, &test.texture)) {
+        let inside = a > 0 && (!test.strip || b > 0) && *left & bit != 0;
+        if inside && chart.is_none_or(|chart| chart.covers(uv, &test.texture)) {
             *pixel = make(test.texture.clamp(uv));
+            *left &= !bit;
         }
+        bit = bit.wrapping_shl(1);
         uv = uv.plus(span.step);
         (a, b) = (a.wrapping_add(da), b.wrapping_add(db));
     }

@@ -1,0 +1,220 @@
+//! Draws rows of pixels: plans a strip when its first row is asked for, then runs and mixed blocks of one row after the other.
+//! The plan is in the caller's memory; pixels go to the caller's row, as `player` asks.
+
+use crate::Bundle;
+use crate::atlas::Texture;
+use crate::coverage::Chart;
+use crate::fixed::PlayUv;
+use crate::format::STRIP;
+use crate::lists::{CHART, FIELD};
+use crate::memory::Workspace;
+use crate::plan::{Edge, Mixed, Plan, Run, Site};
+use crate::player::{Probe, Work};
+use crate::span::{self, Fields, Packed, Span, Test};
+
+/// What pixels are made of positions.
+pub trait Paint {
+    /// A pixel.
+    type Pixel: Copy + Default;
+
+    /// The pixel at `uv`, which is inside the picture.
+    fn at(&self, uv: PlayUv, label: u8) -> Self::Pixel;
+
+    /// A run's pixels, in windows of 2^ROWS rows of 2^WIDTH texels, `TEXELS` in all; `log2`: of a block's pixels.
+    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
+        &self,
+        run: Run,
+        edges: &mut [Edge],
+        out: &mut [Self::Pixel],
+        log2: u32,
+    );
+}
+
+/// A run's pixels by the length of its blocks.
+#[inline(always)]
+fn by_length<T, const WIDTH: u32, const ROWS: u32>(
+    edges: &mut [Edge],
+    out: &mut [T],
+    log2: u32,
+    make: impl Fn(Packed<WIDTH, ROWS>) -> T,
+) {
+    match log2 {
+        2 => span::run::<T, WIDTH, ROWS, 4>(edges, out, make),
+        1 => span::run::<T, WIDTH, ROWS, 2>(edges, out, make),
+        _ => span::long_run(edges, out, log2, make),
+    }
+}
+
+/// Colours, by way of the source image.
+#[derive(Debug)]
+pub struct Colours<'t, F> {
+    /// The source image.
+    pub texture: Texture<'t>,
+    /// A texel's colour.
+    pub colour: F,
+}
+
+impl<F: Fn(u8) -> u16> Paint for Colours<'_, F> {
+    type Pixel = u16;
+
+    #[inline(always)]
+    fn at(&self, uv: PlayUv, _: u8) -> u16 {
+        (self.colour)(self.texture.texel(uv))
+    }
+
+    // A function of its own: the loop needs all registers.
+    #[inline(never)]
+    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [u16], log2: u32) {
+        let from = usize::from(run.row).wrapping_shl(WIDTH);
+        // The plan keeps windows inside the picture.
+        let Some(window) = self.texture.texels.get(from..).and_then(<[u8]>::first_chunk::<TEXELS>) else { return };
+        by_length::<_, WIDTH, ROWS>(edges, out, log2, |at| (self.colour)(window.get(at.texel()).copied().unwrap_or(0)));
+    }
+}
+
+/// Where pixels come from.
+#[derive(Debug)]
+pub struct Probes;
+
+impl Paint for Probes {
+    type Pixel = Probe;
+
+    fn at(&self, uv: PlayUv, label: u8) -> Probe {
+        Probe { label, at: uv }
+    }
+
+    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [Probe], log2: u32) {
+        let label = run.label as u8;
+        by_length::<_, WIDTH, ROWS>(edges, out, log2, |at| Probe { label, at: at.at(run.row) });
+    }
+}
+
+/// A loaded row of cells, ready to be drawn.
+#[derive(Debug)]
+pub struct Drawing<'d, 'a> {
+    site: Site<'d, 'a, 'd>,
+    plan: &'d mut Plan<'a>,
+}
+
+impl<'d, 'a> Drawing<'d, 'a> {
+    /// The row of cells that `space` holds, and the palette.
+    pub fn new(bundle: &'d Bundle<'a>, space: &'d mut Workspace<'a>) -> (Self, &'d [u16])
+    where
+        'a: 'd,
+    {
+        let Workspace { rows: [_, top, bottom, _], halfway, sheets, plan, palette, .. } = space;
+        let site = Site { bundle, rows: [top, halfway, bottom], sheets };
+        (Self { site, plan }, palette)
+    }
+
+    /// Draws pixel row `y`, which lies in the row of cells.
+    #[inline(always)]
+    pub fn row<P: Paint>(&mut self, y: u32, out: &mut [P::Pixel], work: &mut Work, paint: &P) {
+        let log2 = self.site.log2();
+        let (strip, row) = (y >> log2, y & (1u32 << log2).wrapping_sub(1));
+        if self.plan.strip != Some(strip) || self.plan.row > row {
+            self.plan.make(&self.site, strip);
+        }
+        self.plan.skip_to(row);
+        let width = self.site.bundle.size().0 as usize;
+        let drawn = out.len().min(width);
+        let out = out.get_mut(..drawn).unwrap_or(&mut []);
+        let Plan { edge, run: runs, mixed, runs: count, mixes, .. } = &mut *self.plan;
+        for &run in runs.get(..*count).unwrap_or(&[]) {
+            let first = usize::from(run.edge);
+            let Some(edges) = edge.get_mut(first..=first.wrapping_add(run.blocks.into())) else { continue };
+            let from = usize::from(run.block).wrapping_shl(log2);
+            let to = usize::from(run.block).wrapping_add(run.blocks.into()).wrapping_shl(log2);
+            match out.get_mut(from..to) {
+                Some(pixels) => by_width(paint, run, edges, pixels, log2, self.site.bundle.texture().width_log2),
+                None => cut(paint, run, edges, out, log2, self.site.bundle.texture().width_log2),
+            }
+        }
+        for mixed in mixed.get(..*mixes).unwrap_or(&[]) {
+            let from = usize::from(mixed.block).wrapping_shl(log2);
+            let to = from.wrapping_add(1 << log2).min(out.len());
+            if let Some(pixels) = out.get_mut(from..to) {
+                mix(&self.site, *mixed, y, pixels, paint);
+            }
+        }
+        self.plan.row = row.wrapping_add(1);
+        work.smooth_pixels = work.smooth_pixels.wrapping_add(self.plan.smooth);
+        work.torn_pixels = work.torn_pixels.wrapping_add(self.plan.torn);
+        work.coverage_tests = work.coverage_tests.wrapping_add(self.plan.tests);
+    }
+}
+
+/// A run's pixels by the width of the picture: those that `plan` has windows for.
+#[inline(always)]
+fn by_width<P: Paint>(paint: &P, run: Run, edges: &mut [Edge], out: &mut [P::Pixel], log2: u32, width_log2: u32) {
+    match width_log2 {
+        8 => paint.run::<8, 5, 0x2000>(run, edges, out, log2),
+        9 => paint.run::<9, 5, 0x4000>(run, edges, out, log2),
+        _ => paint.run::<10, 4, 0x4000>(run, edges, out, log2),
+    }
+}
+
+/// A run that reaches past the end of `out`: block by block, and of the last only what there is.
+#[inline(never)]
+fn cut<P: Paint>(paint: &P, run: Run, edges: &mut [Edge], out: &mut [P::Pixel], log2: u32, width_log2: u32) {
+    let from = usize::from(run.block).wrapping_shl(log2);
+    let pixels = out.get_mut(from..).unwrap_or(&mut []).chunks_mut(1 << log2);
+    for (index, pixels) in pixels.enumerate() {
+        // Copies: an edge belongs to two blocks, and is stepped once.
+        let Some(&[left, right]) = edges.get(index..).and_then(<[Edge]>::first_chunk::<2>) else { break };
+        let mut whole = [P::Pixel::default(); 32];
+        if let Some(block) = whole.get_mut(..1 << log2) {
+            by_width(paint, run, &mut [left, right], block, log2, width_log2);
+        }
+        for (pixel, made) in pixels.iter_mut().zip(whole) {
+            *pixel = made;
+        }
+    }
+    for edge in edges {
+        edge.advance();
+    }
+}
+
+/// A block pixel by pixel, front to back: the frontmost sheet that covers a pixel shows.
+#[inline(never)]
+fn mix<P: Paint>(site: &Site<'_, '_, '_>, mixed: Mixed, y: u32, out: &mut [P::Pixel], paint: &P) {
+    let (log2, cell) = (site.log2(), site.bundle.grid().log2);
+    let block = site.block(mixed.block.into(), y >> log2);
+    let row = y & (1u32 << log2).wrapping_sub(1);
+    let texture = site.bundle.texture();
+    let mut left = u32::MAX.wrapping_shr(32u32.wrapping_sub(out.len() as u32));
+    let mut sheets = mixed.sheets;
+    while sheets != 0 {
+        let place = sheets.trailing_zeros();
+        sheets &= sheets.wrapping_sub(1);
+        let Some(sheet) = site.sheets.sheet.get(usize::from(mixed.sheet).wrapping_add(place as usize)) else { break };
+        let span = Span::new(block.corners(sheet), row, log2);
+        let make = |uv| paint.at(uv, sheet.label());
+        if sheets == 0 {
+            span::rest(out, left, span, &texture, make);
+            return;
+        }
+        let record = site.bundle.label(sheet.label());
+        let fields = || {
+            let step = y & (1u32 << cell).wrapping_sub(1);
+            let first = u32::from(mixed.block).wrapping_shl(log2) & (1u32 << cell).wrapping_sub(1);
+            Fields::new(block.fields(sheet), step, cell, first)
+        };
+        let test = Test {
+            chart: (sheet.test() != FIELD).then(|| Chart::new(&record)),
+            fields: (sheet.test() != CHART).then(fields),
+            strip: sheet.test() != CHART && record.flags & STRIP != 0,
+            texture,
+        };
+        span::covered(out, &mut left, span, &test, make);
+        if left == 0 {
+            return;
+        }
+    }
+    // Only a broken bundle has a cell without sheets.
+    for (index, pixel) in out.iter_mut().enumerate() {
+        if left.wrapping_shr(index as u32) & 1 != 0 {
+            *pixel = P::Pixel::default();
+        }
+    }
+}
