@@ -110,6 +110,7 @@ fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
             edges: 0,
             runs: 0,
             mixes: 0,
+            last: [0; 2],
             strip: None,
             row: 0,
             smooth: 0,

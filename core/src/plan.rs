@@ -9,6 +9,7 @@ use crate::coverage::{Chart, Cover};
 use crate::fixed::PlayUv;
 use crate::format::{MAX_SHEETS, SPACE_CUBIC, STRIP};
 use crate::lists::{CHART, FIELD};
+use crate::row::Layer;
 use crate::sheet::{Block, Corners, RowSheets, Rows, Sheet};
 
 /// A side of a block in a run, in caller's memory: where it stands at the strip's current row, and how far that is from row to row.
@@ -132,6 +133,8 @@ pub struct Plan<'m> {
     pub runs: usize,
     /// Mixed blocks.
     pub mixes: usize,
+    /// Where the last edge's ends are across, Q16 texels: above, below.
+    pub last: [i32; 2],
     /// The strip it is about; none: nothing yet.
     pub strip: Option<u32>,
     /// The row of the strip at which the edges stand.
@@ -163,6 +166,17 @@ impl Site<'_, '_, '_> {
         if self.cubic() { cell.wrapping_sub(1) } else { cell }
     }
 
+    /// What is above and below strip `strip` where space is cubic.
+    fn lines(&self, strip: u32) -> [Line<'_>; 2] {
+        let [top, halfway, bottom] = self.rows;
+        let first = (strip & 1) as usize;
+        let (upper, lower) = if first == 0 { (top, halfway) } else { (halfway, bottom) };
+        [
+            Line { layer: upper.layer, middle: upper.middle, place: first },
+            Line { layer: lower.layer, middle: lower.middle, place: first.wrapping_add(1) },
+        ]
+    }
+
     fn cubic(&self) -> bool {
         self.bundle.path().space == SPACE_CUBIC
     }
@@ -172,6 +186,24 @@ impl Site<'_, '_, '_> {
     pub fn block(&self, block: u32, strip: u32) -> Block<'_, '_> {
         let quarter = self.cubic().then_some([block & 1 == 1, strip & 1 == 1]);
         Block { rows: self.rows, quarter }
+    }
+}
+
+/// A row of nodes as cubic space has it along a strip's upper or lower side: where nodes are, and halfway to the next.
+#[derive(Clone, Copy, Debug)]
+struct Line<'l> {
+    layer: &'l [Layer],
+    middle: &'l [Layer],
+    /// Which of a sheet's three rows this is.
+    place: usize,
+}
+
+impl Line<'_> {
+    /// A sheet's positions in the middle and at the right side of its cell.
+    #[inline(always)]
+    fn points(&self, sheet: &Sheet) -> Option<[PlayUv; 2]> {
+        let [left, right] = sheet.nodes(self.place);
+        Some([self.middle.get(usize::from(left))?.uv(), self.layer.get(usize::from(right))?.uv()])
     }
 }
 
@@ -189,8 +221,19 @@ impl Plan<'_> {
         let mut left = 0u32;
         let mut block = 0u32;
         let mut column = 0usize;
+        let lines = site.lines(strip);
         while left < width {
             let (first, sheets) = site.sheets.cell(column);
+            if let ([sheet], Some(window)) = (sheets, window)
+                && blocks == 2
+                && self.extend(block as u16, sheet, &lines, window, log2)
+            {
+                // Most of most pictures.
+                let pixels = width.saturating_sub(left).min(2 << log2);
+                self.smooth = self.smooth.wrapping_add(pixels);
+                (left, block, column) = (left.wrapping_add(pixels), block.wrapping_add(2), column.wrapping_add(1));
+                continue;
+            }
             for _ in 0..blocks {
                 let pixels = width.saturating_sub(left).min(1 << log2);
                 let place = site.block(block, strip);
@@ -214,6 +257,41 @@ impl Plan<'_> {
             }
             column = column.wrapping_add(1);
         }
+    }
+
+    /// Appends both blocks of a smooth cell to the last run, if they follow it and fit into its window; else leaves all as it was.
+    #[inline(always)]
+    fn extend(&mut self, block: u16, sheet: &Sheet, lines: &[Line<'_>; 2], window: Window, log2: u32) -> bool {
+        let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return false };
+        if run.label != u16::from(sheet.label()) || run.block.wrapping_add(run.blocks) != block {
+            return false;
+        }
+        let after = self.edges.wrapping_add(2);
+        let Some([middle, right]) = self.edge.get_mut(self.edges..after) else { return false };
+        let [above, below] = lines;
+        let (Some([a, b]), Some([c, d])) = (above.points(sheet), below.points(sheet)) else { return false };
+        let [low, high] = [MARGIN, 1i32.wrapping_shl(window.width_log2.wrapping_add(16)).wrapping_sub(2 * MARGIN)];
+        let inside = |uv: PlayUv| (uv.u.wrapping_sub(low) as u32) < high as u32;
+        let top = i32::from(run.row).wrapping_shl(16);
+        let [least, most] = [top.wrapping_add(MARGIN), 1i32.wrapping_shl(window.rows_log2.wrapping_add(16)).wrapping_sub(2 * MARGIN)];
+        let within = |uv: PlayUv| (uv.v.wrapping_sub(least) as u32) < most as u32;
+        if !(inside(a) && inside(b) && inside(c) && inside(d) && within(a) && within(b) && within(c) && within(d)) {
+            return false;
+        }
+        // As in `append`: steps across of less than half the width, which is a power of two.
+        let half = 1i32.wrapping_shl(window.width_log2.wrapping_add(15));
+        let step = |from: i32, to: i32| to.wrapping_sub(from).wrapping_add(half);
+        let [from, to] = self.last;
+        let steps = step(from, a.u) | step(a.u, b.u) | step(to, c.u) | step(c.u, d.u);
+        if steps as u32 >= (half as u32).wrapping_shl(1) {
+            return false;
+        }
+        *middle = window.edge(a, c, run.row.into(), log2);
+        *right = window.edge(b, d, run.row.into(), log2);
+        run.blocks = run.blocks.wrapping_add(2);
+        self.edges = after;
+        self.last = [b.u, d.u];
+        true
     }
 
     fn mix(&mut self, mixed: Mixed) {
@@ -247,6 +325,7 @@ impl Plan<'_> {
             *slot = window.edge(b, d, run.row.into(), log2);
             run.blocks = run.blocks.wrapping_add(1);
             self.edges = self.edges.wrapping_add(1);
+            self.last = [b.u, d.u];
             return true;
         }
         if !(inside(a.u, width) && inside(c.u, width)) {
@@ -270,6 +349,7 @@ impl Plan<'_> {
         *right = window.edge(b, d, row.into(), log2);
         *slot = Run { block, blocks: 1, edge: self.edges as u16, row, label };
         (self.edges, self.runs) = (after, self.runs.wrapping_add(1));
+        self.last = [b.u, d.u];
         true
     }
 

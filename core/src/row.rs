@@ -1,10 +1,10 @@
 //! A row of nodes at one moment: its layers interpolated in time, or halfway between two such rows.
 //! Keys come from the caller's memory, rows go to `sheet`.
 
-use crate::fixed::{KeyUv, ONE, PlayUv, WEIGHT_BITS, blend, middle};
+use crate::fixed::{KEY_BITS, KEY_MIN, KeyUv, ONE, PLAY_BITS, PlayUv, WEIGHT_BITS, middle};
 use crate::grid::Grid;
 use crate::key::Key;
-use crate::timeline::{Moment, WeightSet};
+use crate::timeline::{Moment, Weights};
 
 /// A layer at one moment: a [`PlayUv`] in caller's memory.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
@@ -42,16 +42,18 @@ impl Layer {
 pub struct Walk<'w> {
     ends: core::slice::Iter<'w, u16>,
     labels: &'w [u8],
+    /// Positions, where the nodes are a key's.
+    uv: &'w [u32],
     from: usize,
     to: usize,
 }
 
 impl<'w> Walk<'w> {
     /// A walk over nodes whose layers start at `starts`, with one entry more than there are nodes; before the first of them.
-    fn new(starts: &'w [u16], labels: &'w [u8]) -> Self {
+    fn new(starts: &'w [u16], labels: &'w [u8], uv: &'w [u32]) -> Self {
         let mut ends = starts.iter();
         let to = ends.next().map_or(0, |&at| usize::from(at));
-        Self { ends, labels, from: to, to }
+        Self { ends, labels, uv, from: to, to }
     }
 
     /// On to the next node; past the last there is one without layers.
@@ -95,22 +97,6 @@ pub struct Around<'k, 'm> {
 }
 
 impl Around<'_, '_> {
-    /// The position at a moment of a layer that the interval's two keys have as `from` and `to`, those around it as `before` and `after`.
-    #[inline(always)]
-    fn blend(&self, [before, after]: [Option<usize>; 2], [from, to]: [usize; 2], weights: &WeightSet) -> PlayUv {
-        let outer = |key: Option<&Key<'_>>, index: Option<usize>| key.zip(index).map(|(key, index)| key.uv(index));
-        let (before, after) = (outer(self.before, before), outer(self.after, after));
-        let [both, no_first, no_last, neither] = weights;
-        let weights = match (before, after) {
-            (Some(_), Some(_)) => both,
-            (None, Some(_)) => no_first,
-            (Some(_), None) => no_last,
-            (None, None) => neither,
-        };
-        let four = [before.unwrap_or_default(), self.from.uv(from), self.to.uv(to), after.unwrap_or_default()];
-        PlayUv { u: blend(four.map(KeyUv::u), *weights), v: blend(four.map(KeyUv::v), *weights) }
-    }
-
     /// The fields of a layer, straight between the interval's keys, Q8 pixels.
     fn field(&self, [from, to]: [usize; 2], linear: i32) -> [i16; 2] {
         let ([a, b], [c, d]) = (self.from.field(from), self.to.field(to));
@@ -124,17 +110,40 @@ impl Around<'_, '_> {
     }
 }
 
+/// The sum of `four` positions times `weights`, as [`crate::fixed::blend`] has it for one coordinate: stored coordinates start at
+/// [`KEY_MIN`], and as the weights sum to one, so does the sum.
+#[inline(always)]
+const fn blend(four: [KeyUv; 4], [a, b, c, d]: Weights) -> Layer {
+    const DROP: u32 = KEY_BITS + WEIGHT_BITS - PLAY_BITS;
+    const START: i32 = (KEY_MIN << WEIGHT_BITS) + (1 << (DROP - 1));
+    let [e, f, g, h] = four;
+    // Magnitudes of weights sum to at most 1.6, stored coordinates are below 2^16: the sums fit.
+    let u = START.wrapping_add(a.wrapping_mul((e.0 & 0xffff) as i32)).wrapping_add(b.wrapping_mul((f.0 & 0xffff) as i32));
+    let u = u.wrapping_add(c.wrapping_mul((g.0 & 0xffff) as i32)).wrapping_add(d.wrapping_mul((h.0 & 0xffff) as i32));
+    let v = START.wrapping_add(a.wrapping_mul((e.0 >> 16) as i32)).wrapping_add(b.wrapping_mul((f.0 >> 16) as i32));
+    let v = v.wrapping_add(c.wrapping_mul((g.0 >> 16) as i32)).wrapping_add(d.wrapping_mul((h.0 >> 16) as i32));
+    Layer { u: u >> DROP, v: v >> DROP }
+}
+
 /// A walk over the `columns` nodes of `key` from node `first` on; over none without a key.
 fn enter<'k>(key: Option<&'k Key<'_>>, first: usize, columns: usize) -> Walk<'k> {
-    let starts = key.and_then(|key| Some((key.start.get(first..=first.wrapping_add(columns))?, &*key.label)));
-    let (starts, labels) = starts.unwrap_or((&[], &[]));
-    Walk::new(starts, labels)
+    let slices = key.and_then(|key| Some((key.start.get(first..=first.wrapping_add(columns))?, &*key.label, &*key.uv)));
+    let (starts, labels, uv) = slices.unwrap_or_default();
+    Walk::new(starts, labels, uv)
 }
 
 /// No layer: see [`NodeRow::right`].
 const NONE: u16 = 0x7fff;
 /// A layer of the same label is at the node to the left.
 const LEFT: u16 = 0x8000;
+
+/// The partner that `link` names: the layer of the same label at the node to the right.
+#[must_use]
+#[inline]
+pub const fn partner(link: u16) -> Option<u16> {
+    let index = link & !LEFT;
+    if index == NONE { None } else { Some(index) }
+}
 
 /// One row of nodes at one moment, in caller's memory.
 #[derive(Debug)]
@@ -153,6 +162,73 @@ pub struct NodeRow<'m> {
     pub field: &'m mut [[i16; 2]],
 }
 
+/// A row of nodes that is being filled, from left to right.
+struct Filling<'f> {
+    start: &'f mut [u16],
+    label: &'f mut [u8],
+    layer: &'f mut [Layer],
+    right: &'f mut [u16],
+    field: &'f mut [[i16; 2]],
+    /// Layers so far; those of the node before the current one start at `before`, its own at `from`.
+    count: usize,
+    before: usize,
+    from: usize,
+}
+
+impl<'f> Filling<'f> {
+    fn new(row: &'f mut NodeRow<'_>) -> Self {
+        // Links have 15 bits; all slices are as long as this one.
+        let NodeRow { start, label, layer, right, field, .. } = row;
+        Self { start, label, layer, right, field, count: 0, before: 0, from: 0 }
+    }
+
+    /// Begins the node in `column`.
+    #[inline(always)]
+    fn begin(&mut self, column: usize) {
+        if let Some(start) = self.start.get_mut(column) {
+            *start = self.count as u16;
+        }
+        (self.before, self.from) = (self.from, self.count);
+    }
+
+    /// Puts a layer, if there is room; its fields where the bundle has such; and links it with its partner at the node before.
+    #[inline(always)]
+    fn put(&mut self, label: u8, layer: Layer, field: impl FnOnce() -> [i16; 2]) {
+        let count = self.count;
+        if count >= usize::from(NONE) {
+            return;
+        }
+        let (Some(label_slot), Some(layer_slot)) = (self.label.get_mut(count), self.layer.get_mut(count)) else { return };
+        (*label_slot, *layer_slot) = (label, layer);
+        if let Some(slot) = self.field.get_mut(count) {
+            *slot = field();
+        }
+        let mut link = NONE;
+        let mut partner = self.before;
+        // Most often the first one is it.
+        while partner < self.from {
+            if self.label.get(partner) == Some(&label) {
+                if let Some(left) = self.right.get_mut(partner) {
+                    *left = *left & LEFT | count as u16;
+                }
+                link |= LEFT;
+                break;
+            }
+            partner = partner.wrapping_add(1);
+        }
+        if let Some(slot) = self.right.get_mut(count) {
+            *slot = link;
+        }
+        self.count = count.wrapping_add(1);
+    }
+
+    /// Ends the row after `columns` nodes; returns how many layers it has.
+    fn end(mut self, columns: usize) -> usize {
+        self.begin(columns);
+        self.count
+    }
+}
+
 impl NodeRow<'_> {
     /// Fills the row with the layers that both ends of the interval carry in row `row` of the grid's nodes, weighted; with none
     /// outside the grid. Returns how many there are.
@@ -162,28 +238,36 @@ impl NodeRow<'_> {
             self.start.fill(0);
             return 0;
         };
-        let (weights, linear) = (&moment.weights, moment.linear);
+        let linear = moment.linear;
         let columns = grid.node_columns();
         let first = row.wrapping_mul(columns);
         let (mut from, mut to) = (enter(Some(keys.from), first, columns), enter(Some(keys.to), first, columns));
         let (mut before, mut after) = (enter(keys.before, first, columns), enter(keys.after, first, columns));
-        let mut count = 0usize;
+        let [both, no_first, no_last, neither] = &moment.weights;
+        let mut row = Filling::new(self);
         for column in 0..columns {
-            self.begin(column, count);
-            for walk in [&mut from, &mut to, &mut before, &mut after] {
-                walk.step();
-            }
+            row.begin(column);
+            from.step();
+            to.step();
+            before.step();
+            after.step();
             for index in from.from..from.to {
-                let Some(&label) = keys.from.label.get(index) else { break };
-                if let Some(other) = to.find(label) {
-                    let both = [index, other];
-                    let uv = keys.blend([before.find(label), after.find(label)], both, weights);
-                    count = self.put(count, label, Layer { u: uv.u, v: uv.v }, || keys.field(both, linear));
-                }
+                let Some(&label) = from.labels.get(index) else { break };
+                let Some(other) = to.find(label) else { continue };
+                let at = |key: &Walk<'_>, index: usize| KeyUv(key.uv.get(index).copied().unwrap_or(0));
+                let (leave, arrive) = (before.find(label), after.find(label));
+                let [middle, next] = [at(&from, index), at(&to, other)];
+                let layer = match (leave, arrive) {
+                    (Some(a), Some(b)) => blend([at(&before, a), middle, next, at(&after, b)], *both),
+                    (None, Some(b)) => blend([KeyUv(0), middle, next, at(&after, b)], *no_first),
+                    (Some(a), None) => blend([at(&before, a), middle, next, KeyUv(0)], *no_last),
+                    (None, None) => blend([KeyUv(0), middle, next, KeyUv(0)], *neither),
+                };
+                row.put(label, layer, || keys.field([index, other], linear));
             }
         }
-        self.begin(columns, count);
-        self.link(columns);
+        let count = row.end(columns);
+        self.halve(count);
         count as u32
     }
 
@@ -191,113 +275,67 @@ impl NodeRow<'_> {
     /// around these. Returns how many layers there are.
     #[inline(never)]
     pub fn between(&mut self, columns: usize, [before, from, to, after]: [&NodeRow<'_>; 4]) -> u32 {
-        let mut count = 0usize;
         let [mut first, mut upper, mut lower, mut last] = [before, from, to, after].map(NodeRow::walk);
+        let [first_layers, upper_layers, lower_layers, last_layers] = [before, from, to, after].map(|row| &*row.layer);
+        let mut row = Filling::new(self);
         for column in 0..columns {
-            self.begin(column, count);
-            for walk in [&mut first, &mut upper, &mut lower, &mut last] {
-                walk.step();
-            }
+            row.begin(column);
+            first.step();
+            upper.step();
+            lower.step();
+            last.step();
             for index in upper.from..upper.to {
-                let Some(&label) = from.label.get(index) else { break };
-                if let Some(below) = lower.find(label) {
-                    let outer = |row: &NodeRow<'_>, at: Option<usize>| at.and_then(|at| row.layer.get(at).copied());
-                    let (above, under) = (outer(before, first.find(label)), outer(after, last.find(label)));
-                    let (Some(&here), Some(&there)) = (from.layer.get(index), to.layer.get(below)) else { break };
-                    // Fields are straight from node to node: nothing asks for them here.
-                    count = self.put(count, label, Layer::middle(above, here, there, under), || [0; 2]);
-                }
+                let Some(&label) = upper.labels.get(index) else { break };
+                let Some(below) = lower.find(label) else { continue };
+                let above = first.find(label).and_then(|at| first_layers.get(at));
+                let under = last.find(label).and_then(|at| last_layers.get(at));
+                let (Some(&here), Some(&there)) = (upper_layers.get(index), lower_layers.get(below)) else { break };
+                // Fields are straight from node to node: nothing asks for them here.
+                row.put(label, Layer::middle(above.copied(), here, there, under.copied()), || [0; 2]);
             }
         }
-        self.begin(columns, count);
-        self.link(columns);
+        let count = row.end(columns);
+        self.halve(count);
         count as u32
     }
 
     /// A walk over the row's nodes.
     #[must_use]
     pub fn walk(&self) -> Walk<'_> {
-        Walk::new(self.start, self.label)
+        Walk::new(self.start, self.label, &[])
     }
 
-    /// Finds every layer's partner and, where there is room for them, what lies halfway to it.
+    /// Works out what lies halfway between each of `count` layers and its partner, where there is room for it.
     #[inline(never)]
-    fn link(&mut self, columns: usize) {
-        let at = |column: usize, start: &[u16]| start.get(column).map_or(0, |&at| usize::from(at));
-        let (mut from, mut next) = (at(0, self.start), at(1, self.start));
-        let mut nodes = Walk::new(self.start, self.label);
-        nodes.step();
-        for column in 0..columns {
-            let end = next;
-            nodes.step();
-            for index in from..end {
-                let Some(&label) = self.label.get(index) else { break };
-                // Indices that do not fit are no partners.
-                let partner = if column.wrapping_add(1) < columns { nodes.find(label).filter(|&at| at < usize::from(NONE)) } else { None };
-                if let Some(partner) = partner {
-                    if let Some(link) = self.right.get_mut(index) {
-                        *link = *link & LEFT | partner as u16;
-                    }
-                    if let Some(link) = self.right.get_mut(partner) {
-                        *link |= LEFT;
-                    }
-                }
+    fn halve(&mut self, count: usize) {
+        let (Some(links), Some(layers)) = (self.right.get(..count), self.layer.get(..count)) else { return };
+        let Some(middles) = self.middle.get_mut(..count) else { return };
+        for (start, link) in links.iter().enumerate() {
+            // Chains of partners start where there is none to the left.
+            if link & LEFT != 0 {
+                continue;
             }
-            (from, next) = (end, nodes.to);
-        }
-        if !self.middle.is_empty() {
-            for index in 0..from {
-                if self.right.get(index).is_some_and(|link| link & LEFT == 0) {
-                    self.halve(index);
+            let Some(&first) = layers.get(start) else { break };
+            let mut index = start;
+            let (mut before, mut from) = (None, first);
+            let mut partner = usize::from(link & !LEFT);
+            let mut next = layers.get(partner);
+            while let Some(&to) = next {
+                let beyond = links.get(partner).map_or(usize::MAX, |link| usize::from(link & !LEFT));
+                next = layers.get(beyond);
+                if let Some(slot) = middles.get_mut(index) {
+                    *slot = Layer::middle(before, from, to, next.copied());
                 }
+                (before, from) = (Some(from), to);
+                (index, partner) = (partner, beyond);
             }
         }
     }
 
-    /// Works out the middles along the chain of partners that starts at layer `index`.
-    fn halve(&mut self, mut index: usize) {
-        let (mut before, mut from) = (None, self.layer(index as u16));
-        let mut partner = self.right(index);
-        let mut to = partner.map(|at| self.layer(at as u16));
-        while let (Some(next), Some(there)) = (partner, to) {
-            let beyond = self.right(next);
-            let after = beyond.map(|at| self.layer(at as u16));
-            if let Some(slot) = self.middle.get_mut(index) {
-                *slot = Layer::middle(before, from, there, after);
-            }
-            (before, from, to) = (Some(from), there, after);
-            (index, partner) = (next, beyond);
-        }
-    }
-
-    /// The partner of layer `index`: the layer of the same label at the node to the right.
+    /// Every layer's link to its partner: see [`partner`].
     #[must_use]
-    #[inline]
-    pub fn right(&self, index: usize) -> Option<usize> {
-        let link = self.right.get(index).copied().unwrap_or(NONE) & !LEFT;
-        (link != NONE).then_some(usize::from(link))
-    }
-
-    #[inline]
-    fn begin(&mut self, column: usize, count: usize) {
-        if let Some(start) = self.start.get_mut(column) {
-            *start = count as u16;
-        }
-    }
-
-    /// Puts a layer at `count`, if there is room; its fields where the bundle has such. Returns where the next one goes.
-    #[inline]
-    fn put(&mut self, count: usize, label: u8, layer: Layer, field: impl FnOnce() -> [i16; 2]) -> usize {
-        let (Some(label_slot), Some(layer_slot), Some(link)) =
-            (self.label.get_mut(count), self.layer.get_mut(count), self.right.get_mut(count))
-        else {
-            return count;
-        };
-        (*label_slot, *layer_slot, *link) = (label, layer, NONE);
-        if let Some(slot) = self.field.get_mut(count) {
-            *slot = field();
-        }
-        count.wrapping_add(1)
+    pub const fn links(&self) -> &[u16] {
+        self.right
     }
 
     /// The fields of layer `index`; those of one that shows everywhere where the bundle has none.

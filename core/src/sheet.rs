@@ -4,7 +4,7 @@
 use crate::fixed::PlayUv;
 use crate::grid::Grid;
 use crate::lists::Lists;
-use crate::row::{Layer, NodeRow, Walk};
+use crate::row::{Layer, NodeRow, Walk, partner};
 
 /// One sheet of a cell, in caller's memory: its label, its test, and where its layers at the cell's left and right edge stand in the rows
 /// above, halfway down and below. Halfway there is only where space is cubic.
@@ -22,6 +22,18 @@ impl Sheet {
     #[must_use]
     pub const fn label(&self) -> u8 {
         self.label
+    }
+
+    /// Its layers at the cell's left and right edge in row `place` of the three.
+    #[must_use]
+    #[inline(always)]
+    pub fn nodes(&self, place: usize) -> [u16; 2] {
+        let ([a, b, c], [d, e, f]) = (self.left, self.right);
+        match place {
+            0 => [a, d],
+            1 => [b, e],
+            _ => [c, f],
+        }
     }
 
     /// The sheet's coverage test: one of [`crate::lists`]'s.
@@ -50,27 +62,21 @@ impl RowSheets<'_> {
     pub fn fill(&mut self, grid: Grid, row: usize, lists: &Lists<'_>, rows: Rows<'_, '_>, cubic: bool) {
         let mut cursor = lists.row(row);
         let mut count = 0usize;
-        let [top, middle, bottom] = rows;
         let [mut above, mut between, mut below] = rows.map(NodeRow::walk);
-        for column in 0..grid.columns {
-            if let Some(start) = self.start.get_mut(column) {
-                *start = count as u16;
-            }
-            for walk in [&mut above, &mut between, &mut below] {
-                walk.step();
-            }
+        let [top, middle, bottom] = rows.map(NodeRow::links);
+        for start in self.start.iter_mut().take(grid.columns) {
+            *start = count as u16;
+            above.step();
+            between.step();
+            below.step();
             let listed = lists.sheets(cursor);
             for (index, &label) in listed.labels.iter().enumerate() {
-                let corner = |row: &NodeRow<'_>, walk: &Walk<'_>| {
-                    let left = walk.find(label)?;
-                    Some((left as u16, row.right(left)? as u16))
-                };
                 // Halfway down there is a layer wherever there is one above and below.
-                let halfway = if cubic { corner(middle, &between) } else { Some((0, 0)) };
-                if let (Some(a), Some(b), Some(c)) = (corner(top, &above), halfway, corner(bottom, &below))
+                let halfway = if cubic { corner(&between, middle, label) } else { Some([0, 0]) };
+                if let (Some([a, d]), Some([b, e]), Some([c, f])) = (corner(&above, top, label), halfway, corner(&below, bottom, label))
                     && let Some(sheet) = self.sheet.get_mut(count)
                 {
-                    *sheet = Sheet { left: [a.0, b.0, c.0], right: [a.1, b.1, c.1], label, test: listed.test(index) as u8 };
+                    *sheet = Sheet { left: [a, b, c], right: [d, e, f], label, test: listed.test(index) as u8 };
                     count = count.wrapping_add(1);
                 }
             }
@@ -88,6 +94,13 @@ impl RowSheets<'_> {
         let from = at(column);
         (from, self.sheet.get(from..at(column.wrapping_add(1))).unwrap_or(&[]))
     }
+}
+
+/// The layers of `label` at a node of a row and at the one to the right of it.
+#[inline(always)]
+fn corner(walk: &Walk<'_>, links: &[u16], label: u8) -> Option<[u16; 2]> {
+    let left = walk.find(label)?;
+    Some([left as u16, partner(*links.get(left)?)?])
 }
 
 /// A block of a cell: all of it, or a quarter where space is cubic; with straight lines in between.
