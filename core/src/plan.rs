@@ -94,7 +94,7 @@ impl Window {
     }
 
     /// The edge between `above` and `below`, 2^`log2` rows apart, in a window from `row` on.
-    #[inline]
+    #[inline(always)]
     const fn edge(self, above: PlayUv, below: PlayUv, row: u32, log2: u32) -> Edge {
         let (shift_u, shift_v) = (self.shift_u(), self.shift_v());
         let [half_u, half_v] = halves(self.width_log2, self.rows_log2);
@@ -224,15 +224,23 @@ impl Plan<'_> {
         let lines = site.lines(strip);
         while left < width {
             let (first, sheets) = site.sheets.cell(column);
-            if let ([sheet], Some(window)) = (sheets, window)
+            if let ([_], Some(window)) = (sheets, window)
                 && blocks == 2
-                && self.extend(block as u16, sheet, &lines, window, log2)
             {
                 // Most of most pictures.
-                let pixels = width.saturating_sub(left).min(2 << log2);
-                self.smooth = self.smooth.wrapping_add(pixels);
-                (left, block, column) = (left.wrapping_add(pixels), block.wrapping_add(2), column.wrapping_add(1));
-                continue;
+                let most = (width.saturating_sub(left) >> log2 >> 1) as usize;
+                let cells = match window.width_log2 {
+                    8 => self.extend::<8, 5>(column, most, site.sheets, lines, log2),
+                    9 => self.extend::<9, 5>(column, most, site.sheets, lines, log2),
+                    _ => self.extend::<10, 4>(column, most, site.sheets, lines, log2),
+                };
+                if cells > 0 {
+                    let pixels = (cells as u32).wrapping_shl(log2).wrapping_mul(2);
+                    self.smooth = self.smooth.wrapping_add(pixels);
+                    (left, block) = (left.wrapping_add(pixels), block.wrapping_add(cells as u32).wrapping_add(cells as u32));
+                    column = column.wrapping_add(cells);
+                    continue;
+                }
             }
             for _ in 0..blocks {
                 let pixels = width.saturating_sub(left).min(1 << log2);
@@ -259,39 +267,58 @@ impl Plan<'_> {
         }
     }
 
-    /// Appends both blocks of a smooth cell to the last run, if they follow it and fit into its window; else leaves all as it was.
-    #[inline(always)]
-    fn extend(&mut self, block: u16, sheet: &Sheet, lines: &[Line<'_>; 2], window: Window, log2: u32) -> bool {
-        let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return false };
-        if run.label != u16::from(sheet.label()) || run.block.wrapping_add(run.blocks) != block {
-            return false;
+    /// Appends smooth cells from `column` on to the last run, both blocks of each, as long as they follow it and fit into its window,
+    /// `most` at most; returns how many. WIDTH and ROWS are the window's.
+    #[inline(never)]
+    fn extend<const WIDTH: u32, const ROWS: u32>(
+        &mut self,
+        column: usize,
+        most: usize,
+        sheets: &RowSheets<'_>,
+        [above, below]: [Line<'_>; 2],
+        log2: u32,
+    ) -> usize {
+        let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return 0 };
+        let block = column.wrapping_mul(2);
+        if usize::from(run.block).wrapping_add(usize::from(run.blocks)) != block {
+            return 0;
         }
-        let after = self.edges.wrapping_add(2);
-        let Some([middle, right]) = self.edge.get_mut(self.edges..after) else { return false };
-        let [above, below] = lines;
-        let (Some([a, b]), Some([c, d])) = (above.points(sheet), below.points(sheet)) else { return false };
-        let [low, high] = [MARGIN, 1i32.wrapping_shl(window.width_log2.wrapping_add(16)).wrapping_sub(2 * MARGIN)];
-        let inside = |uv: PlayUv| (uv.u.wrapping_sub(low) as u32) < high as u32;
-        let top = i32::from(run.row).wrapping_shl(16);
-        let [least, most] = [top.wrapping_add(MARGIN), 1i32.wrapping_shl(window.rows_log2.wrapping_add(16)).wrapping_sub(2 * MARGIN)];
-        let within = |uv: PlayUv| (uv.v.wrapping_sub(least) as u32) < most as u32;
-        if !(inside(a) && inside(b) && inside(c) && inside(d) && within(a) && within(b) && within(c) && within(d)) {
-            return false;
+        let Some((&first, starts)) = sheets.start.get(column..).and_then(<[u16]>::split_first) else { return 0 };
+        let Some(listed) = sheets.sheet.get(usize::from(first)..) else { return 0 };
+        let Some(edges) = self.edge.get_mut(self.edges..) else { return 0 };
+        let label = run.label as u8;
+        let window = Window { width_log2: WIDTH, rows_log2: ROWS };
+        let row = u32::from(run.row);
+        let least = (row as i32).wrapping_shl(16).wrapping_add(MARGIN);
+        let inside = |uv: PlayUv| (uv.u.wrapping_sub(MARGIN) as u32) < (1 << (WIDTH + 16)) - 2 * MARGIN as u32;
+        let within = |uv: PlayUv| (uv.v.wrapping_sub(least) as u32) < (1 << (ROWS + 16)) - 2 * MARGIN as u32;
+        let [mut from, mut to] = self.last;
+        let mut next = first;
+        let mut done = 0usize;
+        for ((sheet, &start), [middle, right]) in listed.iter().zip(starts).zip(edges.as_chunks_mut::<2>().0).take(most) {
+            next = next.wrapping_add(1);
+            if start != next || sheet.label() != label {
+                break;
+            }
+            let (Some([a, b]), Some([c, d])) = (above.points(sheet), below.points(sheet)) else { break };
+            if !(inside(a) && inside(b) && inside(c) && inside(d) && within(a) && within(b) && within(c) && within(d)) {
+                break;
+            }
+            // As in `append`: steps across of less than half the width, which is a power of two.
+            let step = |from: i32, to: i32| to.wrapping_sub(from).wrapping_add(1 << (WIDTH + 15)) as u32;
+            if step(from, a.u) | step(a.u, b.u) | step(to, c.u) | step(c.u, d.u) >= 1 << (WIDTH + 16) {
+                break;
+            }
+            *middle = window.edge(a, c, row, log2);
+            *right = window.edge(b, d, row, log2);
+            (from, to) = (b.u, d.u);
+            done = done.wrapping_add(1);
         }
-        // As in `append`: steps across of less than half the width, which is a power of two.
-        let half = 1i32.wrapping_shl(window.width_log2.wrapping_add(15));
-        let step = |from: i32, to: i32| to.wrapping_sub(from).wrapping_add(half);
-        let [from, to] = self.last;
-        let steps = step(from, a.u) | step(a.u, b.u) | step(to, c.u) | step(c.u, d.u);
-        if steps as u32 >= (half as u32).wrapping_shl(1) {
-            return false;
-        }
-        *middle = window.edge(a, c, run.row.into(), log2);
-        *right = window.edge(b, d, run.row.into(), log2);
-        run.blocks = run.blocks.wrapping_add(2);
-        self.edges = after;
-        self.last = [b.u, d.u];
-        true
+        let blocks = done.wrapping_mul(2);
+        run.blocks = run.blocks.wrapping_add(blocks as u16);
+        self.edges = self.edges.wrapping_add(blocks);
+        self.last = [from, to];
+        done
     }
 
     fn mix(&mut self, mixed: Mixed) {
@@ -302,7 +329,7 @@ impl Plan<'_> {
     }
 
     /// Appends a block that shows one sheet to the last run, or begins another; false where its positions fit no window.
-    #[inline(always)]
+    #[inline(never)]
     fn append(&mut self, block: u16, sheet: &Sheet, corners: Corners, window: Window, height: u32, log2: u32) -> bool {
         let [a, b, c, d] = corners;
         let width = 1i32.wrapping_shl(window.width_log2.wrapping_add(16));

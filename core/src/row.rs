@@ -65,6 +65,29 @@ impl<'w> Walk<'w> {
         }
     }
 
+    /// Whether the next node has one layer.
+    #[inline(always)]
+    fn single(&self) -> bool {
+        self.ends.as_slice().first().is_some_and(|&end| usize::from(end) == self.to.wrapping_add(1))
+    }
+
+    /// Where the layers of the next `most` nodes end.
+    fn ends(&self, most: usize) -> &'w [u16] {
+        self.ends.as_slice().get(..most).unwrap_or(&[])
+    }
+
+    /// The positions from the next node's on.
+    fn coming(&self) -> &'w [u32] {
+        self.uv.get(self.to..).unwrap_or(&[])
+    }
+
+    /// On to the `nodes`-th node from here, all of which have one layer.
+    fn jump(&mut self, nodes: usize) {
+        self.ends = self.ends.as_slice().get(nodes..).unwrap_or(&[]).iter();
+        self.to = self.to.wrapping_add(nodes);
+        self.from = self.to.wrapping_sub(1);
+    }
+
     /// The index of the node's layer of `label`.
     #[must_use]
     #[inline(always)]
@@ -203,23 +226,98 @@ impl<'f> Filling<'f> {
         if let Some(slot) = self.field.get_mut(count) {
             *slot = field();
         }
-        let mut link = NONE;
+        if let Some(slot) = self.right.get_mut(count) {
+            *slot = NONE;
+        }
+        self.join(count);
+        self.count = count.wrapping_add(1);
+    }
+
+    /// Puts what `layer` says for as many nodes from the one in `column` on as have a single layer of one label in all four `walks`, `most` at most;
+    /// the walks step along. Returns how many nodes that were. Most nodes of most pictures are of this kind.
+    #[inline(always)]
+    fn stretch(&mut self, column: usize, most: usize, walks: [&mut Walk<'_>; 4], layer: impl Fn(usize) -> Option<Layer>) -> usize {
+        let [a, b, c, d] = walks;
+        let count = self.count;
+        // In front of nodes stands where their layers end.
+        let upcoming = |walk: &Walk<'_>| walk.ends.as_slice().len().min(walk.labels.len().saturating_sub(walk.to));
+        let room = self.label.len().min(self.layer.len()).min(self.right.len()).min(usize::from(NONE)).saturating_sub(count);
+        let most = most.min(room).min(self.start.len().saturating_sub(column));
+        let most = most.min(upcoming(a)).min(upcoming(b)).min(upcoming(c)).min(upcoming(d));
+        let (ends_a, ends_b, ends_c, ends_d) = (a.ends(most), b.ends(most), c.ends(most), d.ends(most));
+        let Some(labels_a) = a.labels.get(a.to..a.to.wrapping_add(most)) else { return 0 };
+        let Some(labels_b) = b.labels.get(b.to..b.to.wrapping_add(most)) else { return 0 };
+        let Some(labels_c) = c.labels.get(c.to..c.to.wrapping_add(most)) else { return 0 };
+        let Some(labels_d) = d.labels.get(d.to..d.to.wrapping_add(most)) else { return 0 };
+        let (before, from) = (self.from, self.count);
+        let until = count.wrapping_add(most);
+        let Some(starts) = self.start.get_mut(column..column.wrapping_add(most)) else { return 0 };
+        let (Some(label_slots), Some(layer_slots)) = (self.label.get_mut(count..until), self.layer.get_mut(count..until)) else { return 0 };
+        let Some(links) = self.right.get_mut(count..until) else { return 0 };
+        // The first one's partner may be any layer of the node before.
+        let (mut label_before, mut link) = (None, NONE);
+        let mut done = 0usize;
+        while done < most {
+            let passed = done.wrapping_add(1);
+            let one = |ends: &[u16], to: usize| ends.get(done).is_some_and(|&end| usize::from(end).wrapping_sub(to) == passed);
+            if !(one(ends_a, a.to) && one(ends_b, b.to) && one(ends_c, c.to) && one(ends_d, d.to)) {
+                break;
+            }
+            let Some(&label) = labels_b.get(done) else { break };
+            let same = |labels: &[u8]| labels.get(done) == Some(&label);
+            if !(same(labels_a) && same(labels_c) && same(labels_d)) {
+                break;
+            }
+            let Some(layer) = layer(done) else { break };
+            let index = count.wrapping_add(done) as u16;
+            let (Some(start), Some(label_slot), Some(layer_slot)) =
+                (starts.get_mut(done), label_slots.get_mut(done), layer_slots.get_mut(done))
+            else {
+                break;
+            };
+            (*start, *label_slot, *layer_slot) = (index, label, layer);
+            let partner = label_before == Some(label);
+            if let Some(left) = links.get_mut(done.wrapping_sub(1)) {
+                *left = if partner { link & LEFT | index } else { link };
+            }
+            link = if partner { LEFT | NONE } else { NONE };
+            label_before = Some(label);
+            done = passed;
+        }
+        if done == 0 {
+            return 0;
+        }
+        if let Some(last) = links.get_mut(done.wrapping_sub(1)) {
+            *last = link;
+        }
+        for walk in [a, b, c, d] {
+            walk.jump(done);
+        }
+        self.count = count.wrapping_add(done);
+        (self.before, self.from) = (before, from);
+        self.join(count);
+        self.from = self.count.wrapping_sub(1);
+        done
+    }
+
+    /// Links layer `index` with its partner at the node before.
+    #[inline(always)]
+    fn join(&mut self, index: usize) {
+        let Some(&label) = self.label.get(index) else { return };
         let mut partner = self.before;
         // Most often the first one is it.
         while partner < self.from {
             if self.label.get(partner) == Some(&label) {
                 if let Some(left) = self.right.get_mut(partner) {
-                    *left = *left & LEFT | count as u16;
+                    *left = *left & LEFT | index as u16;
                 }
-                link |= LEFT;
-                break;
+                if let Some(slot) = self.right.get_mut(index) {
+                    *slot |= LEFT;
+                }
+                return;
             }
             partner = partner.wrapping_add(1);
         }
-        if let Some(slot) = self.right.get_mut(count) {
-            *slot = link;
-        }
-        self.count = count.wrapping_add(1);
     }
 
     /// Ends the row after `columns` nodes; returns how many layers it has.
@@ -244,8 +342,38 @@ impl NodeRow<'_> {
         let (mut from, mut to) = (enter(Some(keys.from), first, columns), enter(Some(keys.to), first, columns));
         let (mut before, mut after) = (enter(keys.before, first, columns), enter(keys.after, first, columns));
         let [both, no_first, no_last, neither] = &moment.weights;
+        // Where there is no outer key, its weight is none: any other does in its place.
+        let whole = match (keys.before, keys.after) {
+            (Some(_), Some(_)) => both,
+            (None, Some(_)) => no_first,
+            (Some(_), None) => no_last,
+            (None, None) => neither,
+        };
         let mut row = Filling::new(self);
-        for column in 0..columns {
+        let mut column = 0usize;
+        while column < columns {
+            if from.single() && to.single() {
+                let (mut instead_before, mut instead_after) = (from.clone(), to.clone());
+                let first = if keys.before.is_some() { &mut before } else { &mut instead_before };
+                let last = if keys.after.is_some() { &mut after } else { &mut instead_after };
+                let most = columns.wrapping_sub(column);
+                let (leave, arrive, filled) = (from.to, to.to, row.count);
+                let uv = [&*first, &from, &to, &*last].map(|walk| walk.coming());
+                let [a, b, c, d] = uv;
+                let layer = |index: usize| {
+                    let at = |uv: &[u32]| uv.get(index).map(|&uv| KeyUv(uv));
+                    Some(blend([at(a)?, at(b)?, at(c)?, at(d)?], *whole))
+                };
+                let done = row.stretch(column, most, [first, &mut from, &mut to, last], layer);
+                for index in 0..done {
+                    let Some(slot) = row.field.get_mut(filled.wrapping_add(index)) else { break };
+                    *slot = keys.field([leave.wrapping_add(index), arrive.wrapping_add(index)], linear);
+                }
+                column = column.wrapping_add(done);
+                if done > 0 {
+                    continue;
+                }
+            }
             row.begin(column);
             from.step();
             to.step();
@@ -265,6 +393,7 @@ impl NodeRow<'_> {
                 };
                 row.put(label, layer, || keys.field([index, other], linear));
             }
+            column = column.wrapping_add(1);
         }
         let count = row.end(columns);
         self.halve(count);
@@ -278,7 +407,23 @@ impl NodeRow<'_> {
         let [mut first, mut upper, mut lower, mut last] = [before, from, to, after].map(NodeRow::walk);
         let [first_layers, upper_layers, lower_layers, last_layers] = [before, from, to, after].map(|row| &*row.layer);
         let mut row = Filling::new(self);
-        for column in 0..columns {
+        let mut column = 0usize;
+        while column < columns {
+            if upper.single() && lower.single() {
+                let most = columns.wrapping_sub(column);
+                let cut = [(first_layers, &first), (upper_layers, &upper), (lower_layers, &lower), (last_layers, &last)]
+                    .map(|(layers, walk)| layers.get(walk.to..).unwrap_or(&[]));
+                let [a, b, c, d] = cut;
+                let layer = |index: usize| {
+                    let at = |layers: &[Layer]| layers.get(index).copied();
+                    Some(Layer::middle(Some(at(a)?), at(b)?, at(c)?, Some(at(d)?)))
+                };
+                let done = row.stretch(column, most, [&mut first, &mut upper, &mut lower, &mut last], layer);
+                column = column.wrapping_add(done);
+                if done > 0 {
+                    continue;
+                }
+            }
             row.begin(column);
             first.step();
             upper.step();
@@ -293,6 +438,7 @@ impl NodeRow<'_> {
                 // Fields are straight from node to node: nothing asks for them here.
                 row.put(label, Layer::middle(above.copied(), here, there, under.copied()), || [0; 2]);
             }
+            column = column.wrapping_add(1);
         }
         let count = row.end(columns);
         self.halve(count);
