@@ -202,7 +202,7 @@ impl Line<'_> {
     /// A sheet's positions in the middle and at the right side of its cell.
     #[inline(always)]
     fn points(&self, sheet: &Sheet) -> Option<[PlayUv; 2]> {
-        let [left, right] = sheet.nodes(self.place);
+        let [left, right] = sheet.nodes(self.place)?;
         Some([self.middle.get(usize::from(left))?.uv(), self.layer.get(usize::from(right))?.uv()])
     }
 }

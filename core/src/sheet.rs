@@ -11,8 +11,8 @@ use crate::row::{Layer, NodeRow, Walk, partner};
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Sheet {
-    left: [u16; 3],
-    right: [u16; 3],
+    /// Above, halfway down, below: left and right.
+    nodes: [[u16; 2]; 3],
     label: u8,
     test: u8,
 }
@@ -27,13 +27,8 @@ impl Sheet {
     /// Its layers at the cell's left and right edge in row `place` of the three.
     #[must_use]
     #[inline(always)]
-    pub fn nodes(&self, place: usize) -> [u16; 2] {
-        let ([a, b, c], [d, e, f]) = (self.left, self.right);
-        match place {
-            0 => [a, d],
-            1 => [b, e],
-            _ => [c, f],
-        }
+    pub fn nodes(&self, place: usize) -> Option<[u16; 2]> {
+        self.nodes.get(place).copied()
     }
 
     /// The sheet's coverage test: one of [`crate::lists`]'s.
@@ -73,10 +68,10 @@ impl RowSheets<'_> {
             for (index, &label) in listed.labels.iter().enumerate() {
                 // Halfway down there is a layer wherever there is one above and below.
                 let halfway = if cubic { corner(&between, middle, label) } else { Some([0, 0]) };
-                if let (Some([a, d]), Some([b, e]), Some([c, f])) = (corner(&above, top, label), halfway, corner(&below, bottom, label))
+                if let (Some(above), Some(halfway), Some(below)) = (corner(&above, top, label), halfway, corner(&below, bottom, label))
                     && let Some(sheet) = self.sheet.get_mut(count)
                 {
-                    *sheet = Sheet { left: [a, b, c], right: [d, e, f], label, test: listed.test(index) as u8 };
+                    *sheet = Sheet { nodes: [above, halfway, below], label, test: listed.test(index) as u8 };
                     count = count.wrapping_add(1);
                 }
             }
@@ -121,7 +116,7 @@ impl Block<'_, '_> {
     #[inline]
     pub fn corners(&self, sheet: &Sheet) -> Corners {
         let [top, halfway, bottom] = self.rows;
-        let ([a, b, c], [d, e, f]) = (sheet.left, sheet.right);
+        let [[a, d], [b, e], [c, f]] = sheet.nodes;
         let Some([right, lower]) = self.quarter else {
             return [top.layer(a), top.layer(d), bottom.layer(c), bottom.layer(f)].map(Layer::uv);
         };
@@ -138,7 +133,7 @@ impl Block<'_, '_> {
     #[inline]
     pub fn fields(&self, sheet: &Sheet) -> [[i32; 2]; 4] {
         let [top, _, bottom] = self.rows;
-        let ([a, _, c], [d, _, f]) = (sheet.left, sheet.right);
+        let [[a, d], _, [c, f]] = sheet.nodes;
         let wide = |[a, b]: [i16; 2]| [i32::from(a).wrapping_shl(8), i32::from(b).wrapping_shl(8)];
         [top.field(a), top.field(d), bottom.field(c), bottom.field(f)].map(wide)
     }

@@ -22,12 +22,15 @@ impl<const WIDTH: u32, const ROWS: u32> Packed<WIDTH, ROWS> {
         Self((u & !Self::LOW) | v >> Self::DROP)
     }
 
-    /// A step of `u` and `v`, as edges count them, rounded to nearest.
+    /// The 2^`log2`-th part of the way from `left` to `right`, rounded to nearest.
     #[inline(always)]
-    const fn step(u: i32, v: i32) -> u32 {
+    const fn step(left: [u32; 2], right: [u32; 2], log2: u32) -> u32 {
         let [half_u, half_v] = halves(WIDTH, ROWS);
-        let u = u.wrapping_add(half_u as i32) as u32 & !Self::LOW;
-        u.wrapping_add((v.wrapping_add(half_v as i32) >> Self::DROP) as u32)
+        let u = right[0].wrapping_sub(left[0]).wrapping_add(half_u.wrapping_shl(log2));
+        let v = right[1].wrapping_sub(left[1]).wrapping_add(half_v.wrapping_shl(log2));
+        let u = u & !(Self::LOW.wrapping_shl(log2) | 1u32.wrapping_shl(log2).wrapping_sub(1));
+        let v = v as i32 >> Self::DROP.wrapping_add(log2);
+        (v as u32).wrapping_add((u as i32 >> log2) as u32)
     }
 
     /// The texel's place in its window, below 2^(WIDTH + ROWS).
@@ -57,8 +60,7 @@ pub fn run<T, const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(
     let Some(mut left) = edges.next().map(Edge::advance) else { return };
     for (edge, pixels) in edges.zip(out.as_chunks_mut::<PIXELS>().0) {
         let right = edge.advance();
-        let across = |from: u32, to: u32| to.wrapping_sub(from) as i32 >> PIXELS.trailing_zeros();
-        let step = Packed::<WIDTH, ROWS>::step(across(left[0], right[0]), across(left[1], right[1]));
+        let step = Packed::<WIDTH, ROWS>::step(left, right, PIXELS.trailing_zeros());
         let Packed(mut at) = Packed::<WIDTH, ROWS>::new(left);
         for pixel in pixels {
             *pixel = make(Packed(at));
@@ -82,7 +84,7 @@ pub fn long_run<T, const WIDTH: u32, const ROWS: u32>(
         let right = edge.advance();
         let across = |from: u32, to: u32| to.wrapping_sub(from) as i32 >> log2;
         let [u, v] = [across(left[0], right[0]), across(left[1], right[1])];
-        let step = Packed::<WIDTH, ROWS>::step(u, v);
+        let step = Packed::<WIDTH, ROWS>::step(left, right, log2);
         for four in pixels.as_chunks_mut::<4>().0 {
             let Packed(mut at) = Packed::<WIDTH, ROWS>::new(left);
             for pixel in four {
