@@ -36,6 +36,12 @@ impl Texture<'_> {
         self.mask.get(index >> 3).is_some_and(|byte| byte >> (index & 7) & 1 == 1)
     }
 
+    /// Whether `uv` lies inside the picture.
+    #[must_use]
+    #[inline]
+    pub const fn holds(&self, uv: PlayUv) -> bool {
+        ((uv.u >> PLAY_BITS) as u32) < 1 << self.width_log2 && ((uv.v >> PLAY_BITS) as u32) < self.height
+    }
 
     /// The position inside the picture that is closest to `uv`.
     #[must_use]

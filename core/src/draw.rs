@@ -5,12 +5,12 @@ use crate::Bundle;
 use crate::atlas::Texture;
 use crate::coverage::Chart;
 use crate::fixed::PlayUv;
-use crate::format::STRIP;
+use crate::format::{LabelRecord, STRIP};
 use crate::lists::{CHART, FIELD};
 use crate::memory::Workspace;
 use crate::plan::{Edge, Mixed, Plan, Run, Site};
 use crate::player::{Probe, Work};
-use crate::span::{self, Fields, Packed, Span, Test};
+use crate::span::{self, Fields, Packed, Span};
 
 /// What pixels are made of positions.
 pub trait Paint {
@@ -130,13 +130,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
                 None => cut(paint, run, edges, out, log2, self.site.bundle.texture().width_log2),
             }
         }
-        for mixed in mixed.get(..*mixes).unwrap_or(&[]) {
-            let from = usize::from(mixed.block).wrapping_shl(log2);
-            let to = from.wrapping_add(1 << log2).min(out.len());
-            if let Some(pixels) = out.get_mut(from..to) {
-                mix(&self.site, *mixed, y, pixels, paint);
-            }
-        }
+        mix(&self.site, mixed.get(..*mixes).unwrap_or(&[]), y, out, paint);
         self.plan.row = row.wrapping_add(1);
         work.smooth_pixels = work.smooth_pixels.wrapping_add(self.plan.smooth);
         work.torn_pixels = work.torn_pixels.wrapping_add(self.plan.torn);
@@ -175,46 +169,49 @@ fn cut<P: Paint>(paint: &P, run: Run, edges: &mut [Edge], out: &mut [P::Pixel], 
     }
 }
 
-/// A block pixel by pixel, front to back: the frontmost sheet that covers a pixel shows.
+/// Mixed blocks pixel by pixel, front to back: the frontmost sheet that covers a pixel shows.
 #[inline(never)]
-fn mix<P: Paint>(site: &Site<'_, '_, '_>, mixed: Mixed, y: u32, out: &mut [P::Pixel], paint: &P) {
+fn mix<P: Paint>(site: &Site<'_, '_, '_>, mixed: &[Mixed], y: u32, out: &mut [P::Pixel], paint: &P) {
     let (log2, cell) = (site.log2(), site.bundle.grid().log2);
-    let block = site.block(mixed.block.into(), y >> log2);
     let row = y & (1u32 << log2).wrapping_sub(1);
     let texture = site.bundle.texture();
-    let mut left = u32::MAX.wrapping_shr(32u32.wrapping_sub(out.len() as u32));
-    let mut sheets = mixed.sheets;
-    while sheets != 0 {
-        let place = sheets.trailing_zeros();
-        sheets &= sheets.wrapping_sub(1);
-        let Some(sheet) = site.sheets.sheet.get(usize::from(mixed.sheet).wrapping_add(place as usize)) else { break };
-        let span = Span::new(block.corners(sheet), row, log2);
-        let make = |uv| paint.at(uv, sheet.label());
-        if sheets == 0 {
-            span::rest(out, left, span, &texture, make);
-            return;
+    for mixed in mixed {
+        let first = usize::from(mixed.block).wrapping_shl(log2);
+        let last = first.wrapping_add(1 << log2).min(out.len());
+        let Some(pixels) = out.get_mut(first..last) else { break };
+        let block = site.block(mixed.block.into(), y >> log2);
+        let mut left = u32::MAX.wrapping_shr(32u32.wrapping_sub(pixels.len() as u32));
+        let mut sheets = mixed.sheets;
+        while sheets != 0 && left != 0 {
+            let place = usize::from(mixed.sheet).wrapping_add(sheets.trailing_zeros() as usize);
+            sheets &= sheets.wrapping_sub(1);
+            let Some(sheet) = site.sheets.sheet.get(place) else { break };
+            let mut shown = left;
+            // The last one covers what is left.
+            let tested = sheets != 0;
+            let record = if tested { site.bundle.label(sheet.label()) } else { LabelRecord::default() };
+            if tested && sheet.test() != CHART {
+                let step = y & (1u32 << cell).wrapping_sub(1);
+                let fields = Fields::new(block.fields(sheet), step, cell, first as u32 & (1u32 << cell).wrapping_sub(1));
+                shown &= fields.positive(pixels.len(), record.flags & STRIP != 0);
+            }
+            if shown == 0 {
+                continue;
+            }
+            let span = Span::new(block.corners(sheet), row, log2);
+            if tested && sheet.test() != FIELD {
+                shown = span::inside(&Chart::new(&record), shown, pixels.len(), span, &texture);
+            }
+            if shown != 0 {
+                span::paint(pixels, shown, span, &texture, |uv| paint.at(uv, sheet.label()));
+                left &= !shown;
+            }
         }
-        let record = site.bundle.label(sheet.label());
-        let fields = || {
-            let step = y & (1u32 << cell).wrapping_sub(1);
-            let first = u32::from(mixed.block).wrapping_shl(log2) & (1u32 << cell).wrapping_sub(1);
-            Fields::new(block.fields(sheet), step, cell, first)
-        };
-        let test = Test {
-            chart: (sheet.test() != FIELD).then(|| Chart::new(&record)),
-            fields: (sheet.test() != CHART).then(fields),
-            strip: sheet.test() != CHART && record.flags & STRIP != 0,
-            texture,
-        };
-        span::covered(out, &mut left, span, &test, make);
-        if left == 0 {
-            return;
-        }
-    }
-    // Only a broken bundle has a cell without sheets.
-    for (index, pixel) in out.iter_mut().enumerate() {
-        if left.wrapping_shr(index as u32) & 1 != 0 {
-            *pixel = P::Pixel::default();
+        // Only a broken bundle has a cell without sheets.
+        for (index, pixel) in pixels.iter_mut().enumerate().filter(|_| left != 0) {
+            if left.wrapping_shr(index as u32) & 1 != 0 {
+                *pixel = P::Pixel::default();
+            }
         }
     }
 }

@@ -113,7 +113,7 @@ pub type Corners = [PlayUv; 4];
 impl Block<'_, '_> {
     /// Where `sheet` has the block's corners.
     #[must_use]
-    #[inline]
+    #[inline(always)]
     pub fn corners(&self, sheet: &Sheet) -> Corners {
         let [top, halfway, bottom] = self.rows;
         let [[a, d], [b, e], [c, f]] = sheet.nodes;

@@ -147,15 +147,17 @@ impl PlayUv {
     }
 }
 
-/// Paints the pixels of `out` that `left` names, a bit each; `make` turns a position into a pixel. Positions outside the picture count as its edge.
+/// Paints the pixels of `out` that `shown` names, a bit each; `make` turns a position into a pixel. Positions outside the picture count as its edge.
 #[inline(always)]
-pub fn rest<T>(out: &mut [T], mut left: u32, span: Span, texture: &Texture<'_>, make: impl Fn(PlayUv) -> T) {
+pub fn paint<T>(out: &mut [T], mut shown: u32, span: Span, texture: &Texture<'_>, make: impl Fn(PlayUv) -> T) {
     let mut uv = span.from;
+    // A span is straight: if both its ends are inside, all of it is.
+    let inside = texture.holds(uv) && texture.holds(span.at(out.len().wrapping_sub(1)));
     for pixel in out {
-        if left & 1 != 0 {
-            *pixel = make(texture.clamp(uv));
+        if shown & 1 != 0 {
+            *pixel = make(if inside { uv } else { texture.clamp(uv) });
         }
-        left >>= 1;
+        shown >>= 1;
         uv = uv.plus(span.step);
     }
 }
@@ -184,40 +186,37 @@ impl Fields {
     }
 }
 
-/// What decides whether a sheet shows at a pixel: its chart, its fields, or both.
-#[derive(Clone, Copy, Debug)]
-pub struct Test<'t> {
-    /// The chart, where it is tested.
-    pub chart: Option<Chart>,
-    /// The fields, where they are tested.
-    pub fields: Option<Fields>,
-    /// The second field counts too.
-    pub strip: bool,
-    /// Where charts lie.
-    pub texture: Texture<'t>,
+impl Fields {
+    /// At which of the next `pixels` pixels the first field is positive, and the second where there are `two`: a bit each.
+    #[must_use]
+    #[inline]
+    pub fn positive(&self, pixels: usize, two: bool) -> u32 {
+        let Self { from: [mut a, mut b], step: [da, db] } = *self;
+        let mut shown = 0u32;
+        for pixel in 0..pixels as u32 {
+            let both = a > 0 && (!two || b > 0);
+            shown |= u32::from(both).wrapping_shl(pixel);
+            (a, b) = (a.wrapping_add(da), b.wrapping_add(db));
+        }
+        shown
+    }
 }
 
-/// Paints those pixels of `out` that `left` names, a bit each, and at which `test` lets the span show; takes them off `left`.
+/// Those of the pixels that `shown` names, of a span of `pixels`, at which the span lies inside `chart`.
 #[inline(always)]
-pub fn covered<T>(out: &mut [T], left: &mut u32, span: Span, test: &Test<'_>, make: impl Fn(PlayUv) -> T) {
-    // A span is straight: what holds at both its ends holds in between.
-    let ends = [span.from, span.at(out.len().wrapping_sub(1))];
-    let chart = match test.chart.map(|chart| (chart, chart.cover(&ends))) {
-        Some((_, Cover::Nothing)) => return,
-        Some((_, Cover::All)) | None => None,
-        Some((chart, Cover::Part)) => Some(chart),
-    };
-    let mut uv = span.from;
-    let Fields { from: [mut a, mut b], step: [da, db] } = test.fields.unwrap_or(Fields { from: [1, 1], step: [0, 0] });
-    let mut bit = 1u32;
-    for pixel in out {
-        let inside = a > 0 && (!test.strip || b > 0) && *left & bit != 0;
-        if inside && chart.is_none_or(|chart| chart.covers(uv, &test.texture)) {
-            *pixel = make(test.texture.clamp(uv));
-            *left &= !bit;
-        }
-        bit = bit.wrapping_shl(1);
-        uv = uv.plus(span.step);
-        (a, b) = (a.wrapping_add(da), b.wrapping_add(db));
+#[must_use]
+pub fn inside(chart: &Chart, mut shown: u32, pixels: usize, span: Span, texture: &Texture<'_>) -> u32 {
+    match chart.cover(&[span.from, span.at(pixels.wrapping_sub(1))]) {
+        Cover::Nothing => return 0,
+        Cover::All => return shown,
+        Cover::Part => {}
     }
+    let mut uv = span.from;
+    for pixel in 0..pixels as u32 {
+        if !chart.covers(uv, texture) {
+            shown &= !1u32.wrapping_shl(pixel);
+        }
+        uv = uv.plus(span.step);
+    }
+    shown
 }
