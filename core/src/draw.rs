@@ -10,7 +10,7 @@ use crate::lists::{CHART, FIELD};
 use crate::memory::Workspace;
 use crate::plan::{Edge, Mixed, Plan, Run, Site};
 use crate::player::{Probe, Work};
-use crate::span::{self, Fields, Packed, Span};
+use crate::span::{self, Field, Packed, Span};
 
 /// What pixels are made of positions.
 pub trait Paint {
@@ -169,49 +169,64 @@ fn cut<P: Paint>(paint: &P, run: Run, edges: &mut [Edge], out: &mut [P::Pixel], 
     }
 }
 
-/// Mixed blocks pixel by pixel, front to back: the frontmost sheet that covers a pixel shows.
+/// Mixed blocks pixel by pixel.
 #[inline(never)]
 fn mix<P: Paint>(site: &Site<'_, '_, '_>, mixed: &[Mixed], y: u32, out: &mut [P::Pixel], paint: &P) {
-    let (log2, cell) = (site.log2(), site.bundle.grid().log2);
-    let row = y & (1u32 << log2).wrapping_sub(1);
-    let texture = site.bundle.texture();
+    let log2 = site.log2();
     for mixed in mixed {
         let first = usize::from(mixed.block).wrapping_shl(log2);
         let last = first.wrapping_add(1 << log2).min(out.len());
         let Some(pixels) = out.get_mut(first..last) else { break };
-        let block = site.block(mixed.block.into(), y >> log2);
-        let mut left = u32::MAX.wrapping_shr(32u32.wrapping_sub(pixels.len() as u32));
-        let mut sheets = mixed.sheets;
-        while sheets != 0 && left != 0 {
-            let place = usize::from(mixed.sheet).wrapping_add(sheets.trailing_zeros() as usize);
-            sheets &= sheets.wrapping_sub(1);
-            let Some(sheet) = site.sheets.sheet.get(place) else { break };
-            let mut shown = left;
-            // The last one covers what is left.
-            let tested = sheets != 0;
-            let record = if tested { site.bundle.label(sheet.label()) } else { LabelRecord::default() };
-            if tested && sheet.test() != CHART {
-                let step = y & (1u32 << cell).wrapping_sub(1);
-                let fields = Fields::new(block.fields(sheet), step, cell, first as u32 & (1u32 << cell).wrapping_sub(1));
-                shown &= fields.positive(pixels.len(), record.flags & STRIP != 0);
-            }
-            if shown == 0 {
-                continue;
-            }
-            let span = Span::new(block.corners(sheet), row, log2);
-            if tested && sheet.test() != FIELD {
-                shown = span::inside(&Chart::new(&record), shown, pixels.len(), span, &texture);
-            }
-            if shown != 0 {
-                span::paint(pixels, shown, span, &texture, |uv| paint.at(uv, sheet.label()));
-                left &= !shown;
+        // The most frequent length has loops of its own.
+        match <&mut [P::Pixel; 4]>::try_from(&mut *pixels) {
+            Ok(four) => block(site, *mixed, y, four, paint),
+            Err(_) => block(site, *mixed, y, pixels, paint),
+        }
+    }
+}
+
+/// One mixed block, front to back: the frontmost sheet that covers a pixel shows.
+#[inline(always)]
+fn block<P: Paint>(site: &Site<'_, '_, '_>, mixed: Mixed, y: u32, pixels: &mut [P::Pixel], paint: &P) {
+    let (log2, cell) = (site.log2(), site.bundle.grid().log2);
+    let row = y & (1u32 << log2).wrapping_sub(1);
+    let texture = site.bundle.texture();
+    let block = site.block(mixed.block.into(), y >> log2);
+    let mut left = u32::MAX.wrapping_shr(32u32.wrapping_sub(pixels.len() as u32));
+    let mut sheets = mixed.sheets;
+    while sheets != 0 && left != 0 {
+        let place = usize::from(mixed.sheet).wrapping_add(sheets.trailing_zeros() as usize);
+        sheets &= sheets.wrapping_sub(1);
+        let Some(sheet) = site.sheets.sheet.get(place) else { break };
+        let mut shown = left;
+        // The last one covers what is left.
+        let tested = sheets != 0;
+        let record = if tested { site.bundle.label(sheet.label()) } else { LabelRecord::default() };
+        if tested && sheet.test() != CHART {
+            let step = y & (1u32 << cell).wrapping_sub(1);
+            let first = u32::from(mixed.block).wrapping_shl(log2) & (1u32 << cell).wrapping_sub(1);
+            let positive = |which: usize| Field::new(block.field(sheet, which), step, cell, first).positive(pixels.len());
+            shown &= positive(0);
+            if record.flags & STRIP != 0 {
+                shown &= positive(1);
             }
         }
-        // Only a broken bundle has a cell without sheets.
-        for (index, pixel) in pixels.iter_mut().enumerate().filter(|_| left != 0) {
-            if left.wrapping_shr(index as u32) & 1 != 0 {
-                *pixel = P::Pixel::default();
-            }
+        if shown == 0 {
+            continue;
+        }
+        let span = Span::new(block.corners(sheet), row, log2);
+        if tested && sheet.test() != FIELD {
+            shown = span::inside(&Chart::new(&record), shown, pixels.len(), span, &texture);
+        }
+        if shown != 0 {
+            span::paint(pixels, shown, span, &texture, |uv| paint.at(uv, sheet.label()));
+            left &= !shown;
+        }
+    }
+    // Only a broken bundle has a cell without sheets.
+    for (index, pixel) in pixels.iter_mut().enumerate().filter(|_| left != 0) {
+        if left.wrapping_shr(index as u32) & 1 != 0 {
+            *pixel = P::Pixel::default();
         }
     }
 }

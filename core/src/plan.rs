@@ -405,11 +405,9 @@ fn candidates(site: &Site<'_, '_, '_>, block: &Block<'_, '_>, sheets: &[Sheet]) 
         let record = site.bundle.label(sheet.label());
         let mut cover = Cover::All;
         if sheet.test() != CHART {
-            let both = record.flags & STRIP != 0;
-            let fields = block.fields(sheet);
-            cover = cover.and(field_cover(fields.map(|[a, _]| a), block.quarter));
-            if both {
-                cover = cover.and(field_cover(fields.map(|[_, b]| b), block.quarter));
+            cover = field_cover(block.field(sheet, 0), block.quarter);
+            if record.flags & STRIP != 0 {
+                cover = cover.and(field_cover(block.field(sheet, 1), block.quarter));
             }
         }
         if sheet.test() != FIELD && cover != Cover::Nothing {

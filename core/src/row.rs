@@ -46,6 +46,8 @@ pub struct Walk<'w> {
     uv: &'w [u32],
     from: usize,
     to: usize,
+    /// Where `seek` goes on.
+    next: usize,
 }
 
 impl<'w> Walk<'w> {
@@ -53,7 +55,7 @@ impl<'w> Walk<'w> {
     fn new(starts: &'w [u16], labels: &'w [u8], uv: &'w [u32]) -> Self {
         let mut ends = starts.iter();
         let to = ends.next().map_or(0, |&at| usize::from(at));
-        Self { ends, labels, uv, from: to, to }
+        Self { ends, labels, uv, from: to, to, next: to }
     }
 
     /// On to the next node; past the last there is one without layers.
@@ -63,6 +65,20 @@ impl<'w> Walk<'w> {
         if let Some(&end) = self.ends.next() {
             self.to = usize::from(end);
         }
+        self.next = self.from;
+    }
+
+    /// Like `find`, for labels that are asked for in ascending order, as nodes have them.
+    #[inline(always)]
+    fn seek(&mut self, label: u8) -> Option<usize> {
+        while self.next < self.to {
+            match self.labels.get(self.next) {
+                Some(&other) if other < label => self.next = self.next.wrapping_add(1),
+                Some(&other) if other == label => return Some(self.next),
+                _ => break,
+            }
+        }
+        None
     }
 
     /// Whether the next node has one layer.
@@ -381,9 +397,9 @@ impl NodeRow<'_> {
             after.step();
             for index in from.from..from.to {
                 let Some(&label) = from.labels.get(index) else { break };
-                let Some(other) = to.find(label) else { continue };
+                let Some(other) = to.seek(label) else { continue };
                 let at = |key: &Walk<'_>, index: usize| KeyUv(key.uv.get(index).copied().unwrap_or(0));
-                let (leave, arrive) = (before.find(label), after.find(label));
+                let (leave, arrive) = (before.seek(label), after.seek(label));
                 let [middle, next] = [at(&from, index), at(&to, other)];
                 let layer = match (leave, arrive) {
                     (Some(a), Some(b)) => blend([at(&before, a), middle, next, at(&after, b)], *both),
@@ -431,9 +447,9 @@ impl NodeRow<'_> {
             last.step();
             for index in upper.from..upper.to {
                 let Some(&label) = upper.labels.get(index) else { break };
-                let Some(below) = lower.find(label) else { continue };
-                let above = first.find(label).and_then(|at| first_layers.get(at));
-                let under = last.find(label).and_then(|at| last_layers.get(at));
+                let Some(below) = lower.seek(label) else { continue };
+                let above = first.seek(label).and_then(|at| first_layers.get(at));
+                let under = last.seek(label).and_then(|at| last_layers.get(at));
                 let (Some(&here), Some(&there)) = (upper_layers.get(index), lower_layers.get(below)) else { break };
                 // Fields are straight from node to node: nothing asks for them here.
                 row.put(label, Layer::middle(above.copied(), here, there, under.copied()), || [0; 2]);

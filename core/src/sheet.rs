@@ -128,13 +128,13 @@ impl Block<'_, '_> {
         [a, b, c, d].map(Layer::uv)
     }
 
-    /// The fields of `sheet` at the cell's corners, Q16 pixels: straight from edge to edge of the cell, whatever space is.
+    /// Field `which` of `sheet` at the cell's corners, Q16 pixels: straight from edge to edge of the cell, whatever space is.
     #[must_use]
-    #[inline]
-    pub fn fields(&self, sheet: &Sheet) -> [[i32; 2]; 4] {
+    #[inline(always)]
+    pub fn field(&self, sheet: &Sheet, which: usize) -> [i32; 4] {
         let [top, _, bottom] = self.rows;
         let [[a, d], _, [c, f]] = sheet.nodes;
-        let wide = |[a, b]: [i16; 2]| [i32::from(a).wrapping_shl(8), i32::from(b).wrapping_shl(8)];
+        let wide = |fields: [i16; 2]| i32::from(if which == 0 { fields[0] } else { fields[1] }).wrapping_shl(8);
         [top.field(a), top.field(d), bottom.field(c), bottom.field(f)].map(wide)
     }
 }

@@ -162,41 +162,34 @@ pub fn paint<T>(out: &mut [T], mut shown: u32, span: Span, texture: &Texture<'_>
     }
 }
 
-/// A sheet's fields along a row of a block.
+/// A field along a row of a block, Q16 pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Fields {
-    from: [i32; 2],
-    step: [i32; 2],
+pub struct Field {
+    from: i32,
+    step: i32,
 }
 
-impl Fields {
-    /// The fields of row `row` of a cell of 2^`log2` pixels from pixel `first` on, given those at the cell's corners, Q16 pixels.
+impl Field {
+    /// The field of row `row` of a cell of 2^`log2` pixels from pixel `first` on, given what it is at the cell's corners, Q16 pixels.
     #[must_use]
-    #[inline]
-    pub fn new([a, b, c, d]: [[i32; 2]; 4], row: u32, log2: u32, first: u32) -> Self {
+    #[inline(always)]
+    pub const fn new([a, b, c, d]: [i32; 4], row: u32, log2: u32, first: u32) -> Self {
         let half = (1i32 << log2) >> 1;
-        let axis = |a: i32, b: i32, c: i32, d: i32| {
-            let (from, to) = (down(a, c, row, log2), down(b, d, row, log2));
-            let step = to.wrapping_sub(from).wrapping_add(half) >> log2;
-            [from.wrapping_add(step.wrapping_mul(first as i32)), step]
-        };
-        let ([a0, a1], [b0, b1], [c0, c1], [d0, d1]) = (a, b, c, d);
-        let ([from, step], [other, other_step]) = (axis(a0, b0, c0, d0), axis(a1, b1, c1, d1));
-        Self { from: [from, other], step: [step, other_step] }
+        let (from, to) = (down(a, c, row, log2), down(b, d, row, log2));
+        let step = to.wrapping_sub(from).wrapping_add(half) >> log2;
+        Self { from: from.wrapping_add(step.wrapping_mul(first as i32)), step }
     }
-}
 
-impl Fields {
-    /// At which of the next `pixels` pixels the first field is positive, and the second where there are `two`: a bit each.
+    /// At which of the next `pixels` pixels the field is positive: a bit each.
     #[must_use]
-    #[inline]
-    pub fn positive(&self, pixels: usize, two: bool) -> u32 {
-        let Self { from: [mut a, mut b], step: [da, db] } = *self;
+    #[inline(always)]
+    pub fn positive(&self, pixels: usize) -> u32 {
+        let mut field = self.from;
         let mut shown = 0u32;
         for pixel in 0..pixels as u32 {
-            let both = a > 0 && (!two || b > 0);
-            shown |= u32::from(both).wrapping_shl(pixel);
-            (a, b) = (a.wrapping_add(da), b.wrapping_add(db));
+            // The sign of what is below zero where the field is above.
+            shown |= (field.wrapping_neg() as u32 >> 31).wrapping_shl(pixel);
+            field = field.wrapping_add(self.step);
         }
         shown
     }
