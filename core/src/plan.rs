@@ -166,6 +166,13 @@ impl Site<'_, '_, '_> {
         if self.cubic() { cell.wrapping_sub(1) } else { cell }
     }
 
+    /// Block `block` of strip `strip`, where space is cubic.
+    #[must_use]
+    #[inline(always)]
+    pub const fn quarter(&self, block: u32, strip: u32) -> Block<'_, '_> {
+        Block { rows: self.rows, quarter: Some([block & 1 == 1, strip & 1 == 1]) }
+    }
+
     /// What is above and below strip `strip` where space is cubic.
     fn lines(&self, strip: u32) -> [Line<'_>; 2] {
         let [top, halfway, bottom] = self.rows;
