@@ -165,8 +165,7 @@ where
     let mut means = vec![[0.0f64; 3]; layers];
     // An interval at a time: right-hand sides are large.
     for lists in (0..problem.sheets.lists.len()).step_by(cells) {
-        let assembled: Vec<Vec<Assembled>> =
-            (lists..lists + cells).into_par_iter().map(|index| assemble_cell(problem, index)).collect();
+        let assembled: Vec<Vec<Assembled>> = (lists..lists + cells).into_par_iter().map(|index| assemble_cell(problem, index)).collect();
         for Assembled { element, right, diagonal, seen } in assembled.into_iter().flatten() {
             for (layers, (right, diagonal)) in element.layer.iter().zip(right.iter().zip(&diagonal)) {
                 for (&layer, (right, diagonal)) in layers.iter().zip(right.iter().zip(diagonal)).filter(|&(&layer, _)| layer != NOWHERE) {

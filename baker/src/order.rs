@@ -90,8 +90,7 @@ fn observe(evidence: &Evidence<'_>, index: usize, list: &[u8]) -> Vec<Group> {
     let &Evidence { gbuffer, grid, image, layers, fit, fields, .. } = evidence;
     let cells = grid.grid.cells();
     let (interval, cell) = (index / cells, index % cells);
-    let patches =
-        |ways| -> Vec<Patch> { list.iter().map(|&label| Patch::new(grid, layers, [interval, cell], label, ways)).collect() };
+    let patches = |ways| -> Vec<Patch> { list.iter().map(|&label| Patch::new(grid, layers, [interval, cell], label, ways)).collect() };
     let (position_patches, field_patches) = (patches([grid.time, grid.space]), patches([TIME_LINEAR, SPACE_LINEAR]));
     let mut seen: Vec<u64> = Vec::new();
     for frame in grid.frames_of(interval) {

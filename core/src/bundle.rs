@@ -5,7 +5,7 @@ use crate::BundleError;
 use crate::atlas::Texture;
 use crate::format::{
     self, ATLAS, Atlas, Envelope, FIXED, INFO, KEY_BYTES, KNOWN_FLAGS, KeyEntry, LABEL_BYTES, LABELS, LabelRecord, MAGIC, MASK, MASKED,
-    MAX_SECTIONS, MAX_SHEETS, PATH, Path, Section, SPACE_CUBIC, TIME_CUBIC, VERSION,
+    MAX_SECTIONS, MAX_SHEETS, PATH, Path, SPACE_CUBIC, Section, TIME_CUBIC, VERSION,
 };
 use crate::grid::Grid;
 use heapless::Vec;

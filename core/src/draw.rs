@@ -9,8 +9,8 @@ use crate::format::{LabelRecord, STRIP};
 use crate::lists::{CHART, FIELD};
 use crate::memory::Workspace;
 use crate::plan::{Edge, Mixed, Plan, Run, Site};
-use crate::player::{Probe, Work};
 use crate::span::{self, Field, Packed, Span};
+use crate::work::{Probe, Work};
 
 /// What pixels are made of positions.
 pub trait Paint {
@@ -21,23 +21,12 @@ pub trait Paint {
     fn at(&self, uv: PlayUv, label: u8) -> Self::Pixel;
 
     /// A run's pixels, in windows of 2^ROWS rows of 2^WIDTH texels, `TEXELS` in all; `log2`: of a block's pixels.
-    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
-        &self,
-        run: Run,
-        edges: &mut [Edge],
-        out: &mut [Self::Pixel],
-        log2: u32,
-    );
+    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [Self::Pixel], log2: u32);
 }
 
 /// A run's pixels by the length of its blocks.
 #[inline(always)]
-fn by_length<T, const WIDTH: u32, const ROWS: u32>(
-    edges: &mut [Edge],
-    out: &mut [T],
-    log2: u32,
-    make: impl Fn(Packed<WIDTH, ROWS>) -> T,
-) {
+fn by_length<T, const WIDTH: u32, const ROWS: u32>(edges: &mut [Edge], out: &mut [T], log2: u32, make: impl Fn(Packed<WIDTH, ROWS>) -> T) {
     match log2 {
         2 => span::run::<T, WIDTH, ROWS, 4>(edges, out, make),
         1 => span::run::<T, WIDTH, ROWS, 2>(edges, out, make),
@@ -158,8 +147,10 @@ fn by_width<P: Paint>(paint: &P, run: Run, edges: &mut [Edge], out: &mut [P::Pix
 #[inline(never)]
 fn cut<P: Paint>(paint: &P, run: Run, edges: &mut [Edge], out: &mut [P::Pixel], log2: u32, width_log2: u32) {
     let from = usize::from(run.block).wrapping_shl(log2);
-    let pixels = out.get_mut(from..).unwrap_or(&mut []).chunks_mut(1 << log2);
-    for (index, pixels) in pixels.enumerate() {
+    let mut out = out.get_mut(from..).unwrap_or(&mut []);
+    for index in 0..usize::from(run.blocks) {
+        let (pixels, rest) = out.split_at_mut(out.len().min(1 << log2));
+        out = rest;
         // Copies: an edge belongs to two blocks, and is stepped once.
         let Some(&[left, right]) = edges.get(index..).and_then(<[Edge]>::first_chunk::<2>) else { break };
         let mut whole = [P::Pixel::default(); 32];

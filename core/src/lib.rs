@@ -105,8 +105,10 @@ mod row;
 mod sheet;
 mod span;
 pub mod timeline;
+mod work;
 
 pub use bundle::{Bundle, checksum};
 pub use error::{BundleError, MemoryError};
 pub use graphics::FrameImage;
-pub use player::{ByteOrder, Frame, Player, Probe, Work};
+pub use player::{ByteOrder, Frame, Player};
+pub use work::{Probe, Work};

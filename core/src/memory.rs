@@ -98,10 +98,7 @@ fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
         },
         rows: core::array::from_fn(|row| node_row(cutter, cubic || row == 1 || row == 2, fields > 0)),
         halfway: node_row(cutter, cubic, false),
-        sheets: RowSheets {
-            start: cutter.take(one_more(grid.columns)),
-            sheet: cutter.take::<Sheet>(row_sheets),
-        },
+        sheets: RowSheets { start: cutter.take(one_more(grid.columns)), sheet: cutter.take::<Sheet>(row_sheets) },
         plan: Plan {
             // Runs of one block each would have two edges a block.
             edge: cutter.take::<Edge>(blocks.saturating_mul(2)),

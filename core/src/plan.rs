@@ -373,7 +373,7 @@ impl Plan<'_> {
         } else {
             (high.wrapping_add(MARGIN) >> 16).wrapping_add(1).wrapping_sub(1i32.wrapping_shl(window.rows_log2))
         };
-        let row = row.clamp(0, height.wrapping_sub(1u32.wrapping_shl(window.rows_log2)) as i32) as u16;
+        let row = row.min(height.wrapping_sub(1u32.wrapping_shl(window.rows_log2)) as i32).max(0) as u16;
         if ![a, b, c, d].into_iter().all(|uv| within(row, uv)) {
             return false;
         }

@@ -2,13 +2,13 @@
 
 use crate::coder::Decoder;
 use crate::draw::{Colours, Drawing, Probes};
-use crate::fixed::PlayUv;
 use crate::format::{self, Limits, SPACE_CUBIC};
 use crate::key::Nothing;
 use crate::memory::{self, Workspace};
 use crate::record::{Place, SLICE_COST, Shape};
 use crate::row::Around;
 use crate::timeline::Moment;
+use crate::work::{Probe, Work};
 use crate::{Bundle, MemoryError};
 
 /// A frame number.
@@ -25,36 +25,6 @@ pub enum ByteOrder {
     BigEndian,
     /// Least significant byte first.
     LittleEndian,
-}
-
-/// Work done since the last `seek`, for figures and overlays.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub struct Work {
-    /// Keys that the seek decoded whole, or whose last slice it decoded.
-    pub keys: u32,
-    /// Slices of keys that it decoded: a slice is a row of nodes, or the lists of a few rows of cells.
-    pub slices: u32,
-    /// Bytes that it read of those keys' records.
-    pub record_bytes: u32,
-    /// Layers interpolated in time.
-    pub layers: u32,
-    /// Layers worked out halfway between two rows of nodes.
-    pub middles: u32,
-    /// Pixels drawn in smooth cells.
-    pub smooth_pixels: u32,
-    /// Pixels drawn in torn cells.
-    pub torn_pixels: u32,
-    /// Coverage tests made for them.
-    pub coverage_tests: u32,
-}
-
-/// Where a pixel comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub struct Probe {
-    /// The label of the sheet that shows.
-    pub label: u8,
-    /// Its position in the source image, Q15.16 texels.
-    pub at: PlayUv,
 }
 
 /// The last key decoded, and how much of what led to it is known.
@@ -395,4 +365,3 @@ impl<'a> Player<'a> {
         self.work.record_bytes = self.work.record_bytes.wrapping_add(bytes.saturating_sub(coming.bits.left()) as u32);
     }
 }
-

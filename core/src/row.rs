@@ -27,9 +27,7 @@ impl Layer {
     pub const fn middle(before: Option<Self>, from: Self, to: Self, after: Option<Self>) -> Self {
         // One decision for both axes.
         match (before, after) {
-            (Some(b), Some(a)) => {
-                Self { u: middle(Some(b.u), from.u, to.u, Some(a.u)), v: middle(Some(b.v), from.v, to.v, Some(a.v)) }
-            }
+            (Some(b), Some(a)) => Self { u: middle(Some(b.u), from.u, to.u, Some(a.u)), v: middle(Some(b.v), from.v, to.v, Some(a.v)) },
             (Some(b), None) => Self { u: middle(Some(b.u), from.u, to.u, None), v: middle(Some(b.v), from.v, to.v, None) },
             (None, Some(a)) => Self { u: middle(None, from.u, to.u, Some(a.u)), v: middle(None, from.v, to.v, Some(a.v)) },
             (None, None) => Self { u: middle(None, from.u, to.u, None), v: middle(None, from.v, to.v, None) },

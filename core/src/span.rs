@@ -80,7 +80,10 @@ pub fn long_run<T, const WIDTH: u32, const ROWS: u32>(
 ) {
     let mut edges = edges.iter_mut();
     let Some(mut left) = edges.next().map(Edge::advance) else { return };
-    for (edge, pixels) in edges.zip(out.chunks_exact_mut(1 << log2)) {
+    let mut out = out;
+    for edge in edges {
+        let Some((pixels, rest)) = out.split_at_mut_checked(1 << log2) else { return };
+        out = rest;
         let right = edge.advance();
         let across = |from: u32, to: u32| to.wrapping_sub(from) as i32 >> log2;
         let [u, v] = [across(left[0], right[0]), across(left[1], right[1])];
@@ -124,10 +127,8 @@ impl Span {
         let from = PlayUv { u: down(a.u, c.u, row, log2), v: down(a.v, c.v, row, log2) };
         let to = PlayUv { u: down(b.u, d.u, row, log2), v: down(b.v, d.v, row, log2) };
         let half = (1i32 << log2) >> 1;
-        let step = PlayUv {
-            u: to.u.wrapping_sub(from.u).wrapping_add(half) >> log2,
-            v: to.v.wrapping_sub(from.v).wrapping_add(half) >> log2,
-        };
+        let step =
+            PlayUv { u: to.u.wrapping_sub(from.u).wrapping_add(half) >> log2, v: to.v.wrapping_sub(from.v).wrapping_add(half) >> log2 };
         Self { from, step }
     }
 

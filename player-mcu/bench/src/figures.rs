@@ -9,7 +9,7 @@ use std::fs;
 use std::path::Path;
 
 /// The figures of one scene on one target. Parts of a frame are instructions a pixel of the whole screen; those of smooth and torn
-/// cells are a pixel of their own, by least squares over all rows.
+/// cells are a pixel of their own, by least squares over rows. The code is that of the whole firmware, its bundle left out.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Figures {
     pub instructions_per_pixel_mean: f64,
@@ -23,8 +23,7 @@ pub struct Figures {
     pub stack_peak_bytes: u64,
     pub player_struct_bytes: u64,
     pub working_memory_bytes: u64,
-    pub static_ram_bytes: u64,
-    pub core_code_bytes: u64,
+    pub firmware_code_bytes: u64,
     pub bundle_bytes: u64,
     pub frames: u64,
     pub frames_identical_to_host: u64,
@@ -37,7 +36,7 @@ pub type Results = BTreeMap<String, BTreeMap<String, Figures>>;
 ///
 /// # Errors
 /// Frames missing, or one whose pixels are others than the host's.
-pub fn figures(played: &Played, expected: &Expected, core_code_bytes: u64) -> Result<Figures> {
+pub fn figures(played: &Played, expected: &Expected, firmware_code_bytes: u64) -> Result<Figures> {
     ensure!(played.frames.len() == expected.checksums.len(), "{} frames of {}", played.frames.len(), expected.checksums.len());
     for (line, &checksum) in played.frames.iter().zip(&expected.checksums) {
         ensure!(line.checksum == checksum, "frame {}: other pixels than on the host", line.frame);
@@ -60,9 +59,7 @@ pub fn figures(played: &Played, expected: &Expected, core_code_bytes: u64) -> Re
         stack_peak_bytes: played.stack_peak_bytes,
         player_struct_bytes: played.player_bytes,
         working_memory_bytes: played.memory_bytes,
-        // The player has no static of its own; what the firmware has is its buffers.
-        static_ram_bytes: 0,
-        core_code_bytes,
+        firmware_code_bytes,
         bundle_bytes: expected.bytes,
         frames: played.frames.len() as u64,
         frames_identical_to_host: played.frames.len() as u64,
@@ -93,12 +90,12 @@ pub fn write_table(readme: &Path, results: &Results) -> Result<()> {
     let (before, rest) = text.split_once(BEGIN).with_context(|| format!("{}: no line {BEGIN}", readme.display()))?;
     let (_, after) = rest.split_once(END).with_context(|| format!("{}: no line {END}", readme.display()))?;
     let mut table = String::from(
-        "\n| target | scene | instr/px | worst / mean | keys | loading | drawing | smooth, per smooth px | torn, per torn px | torn | working memory | stack |\n|---|---|---|---|---|---|---|---|---|---|---|---|\n",
+        "\n| target | scene | instr/px | worst / mean | keys | loading | drawing | smooth, per smooth px | torn, per torn px | torn | working memory | stack | code |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
     for (target, scenes) in results {
         for (scene, f) in scenes {
             table += &format!(
-                "| {target} | {scene} | **{:.2}** | {:.2} | {:.2} | {:.2} | {:.2} | {:.1} | {:.1} | {:.1} % | {} B | {} B |\n",
+                "| {target} | {scene} | **{:.2}** | {:.2} | {:.2} | {:.2} | {:.2} | {:.1} | {:.1} | {:.1} % | {} B | {} B | {} B |\n",
                 f.instructions_per_pixel_mean,
                 f.worst_over_mean,
                 f.key_decoding_instructions_per_pixel,
@@ -109,6 +106,7 @@ pub fn write_table(readme: &Path, results: &Results) -> Result<()> {
                 f.torn_percent,
                 f.working_memory_bytes,
                 f.stack_peak_bytes,
+                f.firmware_code_bytes,
             );
         }
     }

@@ -1,4 +1,4 @@
-//! `cubist-mcu TARGET SCENE FIRMWARE BUNDLE CORE_CODE_BYTES RESULTS README`: plays a firmware in its emulator, holds every frame's pixels against the
+//! `cubist-mcu TARGET SCENE FIRMWARE BUNDLE CODE_BYTES RESULTS README`: plays a firmware in its emulator, holds every frame's pixels against the
 //! host's, and puts the figures into RESULTS (JSON: target, then scene) and the table of README. `run` calls it for each.
 
 mod figures;
@@ -13,7 +13,7 @@ use std::{env, fs};
 fn main() -> Result<()> {
     let arguments: Vec<String> = env::args().skip(1).collect();
     let [target, scene, firmware, bundle, code, results, readme] = arguments.as_slice() else {
-        bail!("usage: cubist-mcu TARGET SCENE FIRMWARE BUNDLE CORE_CODE_BYTES RESULTS README");
+        bail!("usage: cubist-mcu TARGET SCENE FIRMWARE BUNDLE CODE_BYTES RESULTS README");
     };
     let scratch = env::temp_dir().join(format!("cubist-mcu-{}", std::process::id()));
     fs::create_dir_all(&scratch)?;
