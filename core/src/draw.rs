@@ -24,16 +24,6 @@ pub trait Paint {
     fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [Self::Pixel], log2: u32);
 }
 
-/// A run's pixels by the length of its blocks.
-#[inline(always)]
-fn by_length<T, const WIDTH: u32, const ROWS: u32>(edges: &mut [Edge], out: &mut [T], log2: u32, make: impl Fn(Packed<WIDTH, ROWS>) -> T) {
-    match log2 {
-        2 => span::run::<T, WIDTH, ROWS, 4>(edges, out, make),
-        1 => span::run::<T, WIDTH, ROWS, 2>(edges, out, make),
-        _ => span::long_run(edges, out, log2, make),
-    }
-}
-
 /// Colours, by way of the source image.
 #[derive(Debug)]
 pub struct Colours<'t, F> {
@@ -57,7 +47,13 @@ impl<F: Fn(u8) -> u16> Paint for Colours<'_, F> {
         let from = usize::from(run.row).wrapping_shl(WIDTH);
         // The plan keeps windows inside the picture.
         let Some(window) = self.texture.texels.get(from..).and_then(<[u8]>::first_chunk::<TEXELS>) else { return };
-        by_length::<_, WIDTH, ROWS>(edges, out, log2, |at| (self.colour)(window.get(at.texel()).copied().unwrap_or(0)));
+        let make = |at: Packed<WIDTH, ROWS>| (self.colour)(window.get(at.texel()).copied().unwrap_or(0));
+        // Blocks of four in a picture 512 wide are the rule, and have a loop of their own.
+        if (WIDTH, log2) == (9, 2) {
+            span::run::<_, WIDTH, ROWS, 4>(edges, out, make);
+        } else {
+            span::any_run(edges, out, log2, make);
+        }
     }
 }
 
@@ -74,7 +70,7 @@ impl Paint for Probes {
 
     fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [Probe], log2: u32) {
         let label = run.label as u8;
-        by_length::<_, WIDTH, ROWS>(edges, out, log2, |at| Probe { label, at: at.at(run.row) });
+        span::any_run(edges, out, log2, |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(run.row) });
     }
 }
 
@@ -134,7 +130,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
 }
 
 /// A run's pixels by the width of the picture: those that `plan` has windows for.
-#[inline(always)]
+#[inline(never)]
 fn by_width<P: Paint>(paint: &P, run: Run, edges: &mut [Edge], out: &mut [P::Pixel], log2: u32, width_log2: u32) {
     match width_log2 {
         8 => paint.run::<8, 5, 0x2000>(run, edges, out, log2),

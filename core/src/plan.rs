@@ -236,11 +236,8 @@ impl Plan<'_> {
             {
                 // Most of most pictures.
                 let most = (width.saturating_sub(left) >> log2 >> 1) as usize;
-                let cells = match window.width_log2 {
-                    8 => self.extend::<8, 5>(column, most, site.sheets, lines, log2),
-                    9 => self.extend::<9, 5>(column, most, site.sheets, lines, log2),
-                    _ => self.extend::<10, 4>(column, most, site.sheets, lines, log2),
-                };
+                // In pictures 512 wide, as most are; others go by `append` alone.
+                let cells = if window.width_log2 == 9 { self.extend::<9, 5>(column, most, site.sheets, lines, log2) } else { 0 };
                 if cells > 0 {
                     let pixels = (cells as u32).wrapping_shl(log2).wrapping_mul(2);
                     self.smooth = self.smooth.wrapping_add(pixels);

@@ -70,9 +70,9 @@ pub fn run<T, const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(
     }
 }
 
-/// Like [`run`], with blocks of 2^`log2` pixels, eight at least: every four the position is packed anew, so that steps' rounding does not add up.
+/// Like [`run`], with blocks of any 2^`log2` pixels: every four the position is packed anew, so that steps' rounding does not add up.
 #[inline(always)]
-pub fn long_run<T, const WIDTH: u32, const ROWS: u32>(
+pub fn any_run<T, const WIDTH: u32, const ROWS: u32>(
     edges: &mut [Edge],
     out: &mut [T],
     log2: u32,
@@ -82,13 +82,15 @@ pub fn long_run<T, const WIDTH: u32, const ROWS: u32>(
     let Some(mut left) = edges.next().map(Edge::advance) else { return };
     let mut out = out;
     for edge in edges {
-        let Some((pixels, rest)) = out.split_at_mut_checked(1 << log2) else { return };
+        let Some((mut pixels, rest)) = out.split_at_mut_checked(1 << log2) else { return };
         out = rest;
         let right = edge.advance();
         let across = |from: u32, to: u32| to.wrapping_sub(from) as i32 >> log2;
         let [u, v] = [across(left[0], right[0]), across(left[1], right[1])];
         let step = Packed::<WIDTH, ROWS>::step(left, right, log2);
-        for four in pixels.as_chunks_mut::<4>().0 {
+        while !pixels.is_empty() {
+            let (four, rest) = pixels.split_at_mut(pixels.len().min(4));
+            pixels = rest;
             let Packed(mut at) = Packed::<WIDTH, ROWS>::new(left);
             for pixel in four {
                 *pixel = make(Packed(at));
