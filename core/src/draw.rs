@@ -16,6 +16,8 @@ use crate::work::{Probe, Work};
 pub trait Paint {
     /// A pixel.
     type Pixel: Copy + Default;
+    /// Made so often that loops of their own pay.
+    const OFTEN: bool;
 
     /// The pixel at `uv`, which is inside the picture.
     fn at(&self, uv: PlayUv, label: u8) -> Self::Pixel;
@@ -35,6 +37,7 @@ pub struct Colours<'t, F> {
 
 impl<F: Fn(u8) -> u16> Paint for Colours<'_, F> {
     type Pixel = u16;
+    const OFTEN: bool = true;
 
     #[inline(always)]
     fn at(&self, uv: PlayUv, _: u8) -> u16 {
@@ -63,6 +66,7 @@ pub struct Probes;
 
 impl Paint for Probes {
     type Pixel = Probe;
+    const OFTEN: bool = false;
 
     fn at(&self, uv: PlayUv, label: u8) -> Probe {
         Probe { label, at: uv }
@@ -117,7 +121,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
         }
         let mixed = mixed.get(..*mixes).unwrap_or(&[]);
         // Quarters of cells of eight pixels are the rule; with numbers that are known the code is a third shorter to run.
-        if (log2, self.site.bundle.grid().log2) == (2, 3) {
+        if P::OFTEN && (log2, self.site.bundle.grid().log2) == (2, 3) {
             mix::<P, true>(&self.site, mixed, y, out, paint);
         } else {
             mix::<P, false>(&self.site, mixed, y, out, paint);
@@ -173,9 +177,15 @@ fn mix<P: Paint, const EIGHT: bool>(site: &Site<'_, '_, '_>, mixed: &[Mixed], y:
         // The most frequent length has loops of its own.
         match <&mut [P::Pixel; 4]>::try_from(&mut *pixels) {
             Ok(four) if EIGHT => block::<P, EIGHT>(site, *mixed, y, four, paint),
-            _ => block::<P, false>(site, *mixed, y, pixels, paint),
+            _ => any_block(site, *mixed, y, pixels, paint),
         }
     }
+}
+
+/// A block of any length.
+#[inline(never)]
+fn any_block<P: Paint>(site: &Site<'_, '_, '_>, mixed: Mixed, y: u32, pixels: &mut [P::Pixel], paint: &P) {
+    block::<P, false>(site, mixed, y, pixels, paint);
 }
 
 /// One mixed block, front to back: the frontmost sheet that covers a pixel shows.
