@@ -294,8 +294,9 @@ impl Plan<'_> {
         let window = Window { width_log2: WIDTH, rows_log2: ROWS };
         let row = u32::from(run.row);
         let least = (row as i32).wrapping_shl(16).wrapping_add(MARGIN);
-        let inside = |uv: PlayUv| (uv.u.wrapping_sub(MARGIN) as u32) < (1 << (WIDTH + 16)) - 2 * MARGIN as u32;
-        let within = |uv: PlayUv| (uv.v.wrapping_sub(least) as u32) < (1 << (ROWS + 16)) - 2 * MARGIN as u32;
+        let [across, down] = [WIDTH, ROWS].map(|log2| 1u32.wrapping_shl(log2.wrapping_add(16)));
+        let inside = |uv: PlayUv| (uv.u.wrapping_sub(MARGIN) as u32) < across.wrapping_sub((2 * MARGIN) as u32);
+        let within = |uv: PlayUv| (uv.v.wrapping_sub(least) as u32) < down.wrapping_sub((2 * MARGIN) as u32);
         let [mut from, mut to] = self.last;
         let mut next = first;
         let mut done = 0usize;
@@ -309,8 +310,8 @@ impl Plan<'_> {
                 break;
             }
             // As in `append`: steps across of less than half the width, which is a power of two.
-            let step = |from: i32, to: i32| to.wrapping_sub(from).wrapping_add(1 << (WIDTH + 15)) as u32;
-            if step(from, a.u) | step(a.u, b.u) | step(to, c.u) | step(c.u, d.u) >= 1 << (WIDTH + 16) {
+            let step = |from: i32, to: i32| to.wrapping_sub(from).wrapping_add((across >> 1) as i32) as u32;
+            if step(from, a.u) | step(a.u, b.u) | step(to, c.u) | step(c.u, d.u) >= across {
                 break;
             }
             *middle = window.edge(a, c, row, log2);

@@ -16,6 +16,10 @@ impl<const WIDTH: u32, const ROWS: u32> Packed<WIDTH, ROWS> {
     const LOW: u32 = (1 << Self::BITS) - 1;
     /// How far an edge's v is shifted down.
     const DROP: u32 = 31 - Self::BITS;
+    /// How far the texel's column is shifted down.
+    const ACROSS: u32 = 32 - WIDTH;
+    /// The texel's row, which stands where its place in the window has it.
+    const DOWN: u32 = Self::LOW & !((1 << WIDTH) - 1);
 
     #[inline(always)]
     const fn new([u, v]: [u32; 2]) -> Self {
@@ -37,14 +41,14 @@ impl<const WIDTH: u32, const ROWS: u32> Packed<WIDTH, ROWS> {
     #[must_use]
     #[inline(always)]
     pub const fn texel(self) -> usize {
-        (self.0 >> (32 - WIDTH) | self.0 & (Self::LOW & !((1 << WIDTH) - 1))) as usize
+        (self.0 >> Self::ACROSS | self.0 & Self::DOWN) as usize
     }
 
     /// The position in the picture, for a window from `row` on.
     #[must_use]
     pub fn at(self, row: u16) -> PlayUv {
         let u = (self.0 >> Self::BITS).wrapping_shl(Self::BITS.wrapping_add(WIDTH).wrapping_sub(16));
-        let v = (self.0 & Self::LOW).wrapping_shl(16 - WIDTH).wrapping_add(u32::from(row).wrapping_shl(16));
+        let v = (self.0 & Self::LOW).wrapping_shl(16u32.wrapping_sub(WIDTH)).wrapping_add(u32::from(row).wrapping_shl(16));
         PlayUv { u: u as i32, v: v as i32 }
     }
 }
