@@ -38,6 +38,7 @@ impl Texture<'_> {
 
     /// Whether `uv` lies inside the picture.
     #[must_use]
+    #[inline]
     pub const fn holds(&self, uv: PlayUv) -> bool {
         ((uv.u >> PLAY_BITS) as u32) < 1 << self.width_log2 && ((uv.v >> PLAY_BITS) as u32) < self.height
     }

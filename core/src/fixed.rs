@@ -2,7 +2,7 @@
 //! Values come from `key`, weights from `timeline`; results go to `cell` and `span`.
 //!
 //! A number's unit goes with its place: stored positions count 1/32 to 1/128 texel, as the bundle says, playback's are Q15.16 texels; time weights are Q14;
-//! a field is a code from -37 to 37 where it is stored, Q8 pixels in a key, Q16 pixels during playback.
+//! a field is a code from -73 to 73 where it is stored, Q8 pixels in a key, Q16 pixels during playback.
 
 /// Fraction bits that a stored coordinate can have: 5 reach from 512 texels outside the picture to 1536, each more halves that.
 pub const KEY_BITS: core::ops::RangeInclusive<u8> = 5..=7;
@@ -51,28 +51,6 @@ pub struct PlayUv {
     pub v: i32,
 }
 
-/// The sum of `values` (with `bits` fraction bits, one of [`KEY_BITS`]) times `weights` (Q14, summing to [`ONE`]), in Q15.16, rounded to
-/// nearest, ties up; exact where one weight is [`ONE`].
-#[must_use]
-#[expect(
-    clippy::arithmetic_side_effects,
-    reason = "the weights' magnitudes sum to at most 1.6 and values are below 1.5 * 2^15: no partial sum reaches 1.2 * 2^30 in size"
-)]
-pub const fn blend([a, b, c, d]: [i32; 4], [e, f, g, h]: [i32; 4], bits: u32) -> i32 {
-    let drop = (bits & 7) + WEIGHT_BITS - PLAY_BITS;
-    (a * e + b * f + c * g + d * h + (1 << drop >> 1)) >> drop
-}
-
-/// The value `step` / 2^`log2` of the way from `from` to `to`, rounded down; exact at both ends.
-#[must_use]
-#[expect(
-    clippy::arithmetic_side_effects,
-    reason = "the product of a 33-bit difference and step <= 64 fits i64, the sum lies between from and to"
-)]
-pub const fn part(from: i32, to: i32, step: u32, log2: u32) -> i32 {
-    (from as i64 + (((to as i64 - from as i64) * step as i64) >> log2)) as i32
-}
-
 /// The value halfway from `from` to `to` on the smoothest curve through them and what comes before and after on the same line, where there is
 /// such: the four-point rule (Dyn, Levin, Gregory 1987), a parabola without one of the outer two, the mean without both.
 /// Exact where all are the same.
@@ -94,7 +72,7 @@ pub const fn middle(before: Option<i32>, from: i32, to: i32, after: Option<i32>)
 /// The largest size of a field code, which stands for 128 pixels.
 pub const MAX_FIELD: i32 = 73;
 
-/// The distance that field code `code` stands for, Q8 pixels: four steps an octave from 1/4 pixel, with a sign; 0 is 0.
+/// The distance that field code `code` stands for, Q8 pixels: eight steps an octave from 1/4 pixel, with a sign; 0 is 0.
 #[must_use]
 pub fn field_distance(code: i8) -> i32 {
     // 64 * 2^(i / 8).
@@ -126,30 +104,12 @@ mod tests {
     use super::*;
 
     #[test]
-    fn blend_is_exact_at_the_keys_and_keeps_constants() {
-        for bits in KEY_BITS.map(u32::from) {
-            let scale = PLAY_BITS - bits;
-            assert_eq!(blend([1, KEY_MAX, 3, 4], [0, ONE, 0, 0], bits), KEY_MAX << scale);
-            assert_eq!(blend([1, 2, KEY_MIN, 4], [0, 0, ONE, 0], bits), KEY_MIN << scale);
-            assert_eq!(blend([1234; 4], [-700, ONE - 300, 1700, -700], bits), 1234 << scale);
-        }
-    }
-
-    #[test]
     fn field_codes_come_back() {
-        for code in -37..=37i8 {
+        for code in -73..=73i8 {
             assert_eq!(field_code(field_distance(code)), code);
         }
-        assert_eq!(field_distance(37), 128 << 8);
-        assert_eq!((field_code(1 << 30), field_code(-(1 << 30)), field_code(20)), (37, -37, 0));
-    }
-
-    #[test]
-    fn part_is_exact_at_both_ends() {
-        for log2 in 2..=5 {
-            assert_eq!(part(-7, 1_000_003, 0, log2), -7);
-            assert_eq!(part(-7, 1_000_003, 1 << log2, log2), 1_000_003);
-        }
+        assert_eq!(field_distance(73), 128 << 8);
+        assert_eq!((field_code(1 << 30), field_code(-(1 << 30)), field_code(20)), (73, -73, 0));
     }
 
     #[test]

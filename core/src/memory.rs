@@ -6,6 +6,7 @@ use crate::format::{self, SPACE_CUBIC};
 use crate::key::Key;
 use crate::lists::{self, Lists};
 use crate::nodes;
+use crate::plan::{Edge, Mixed, Plan, Run};
 use crate::record::Stream;
 use crate::row::{Layer, NodeRow};
 use crate::sheet::{RowSheets, Sheet};
@@ -25,6 +26,8 @@ pub struct Workspace<'m> {
     pub halfway: NodeRow<'m>,
     /// The sheets of the current row of cells.
     pub sheets: RowSheets<'m>,
+    /// What the current strip of it shows.
+    pub plan: Plan<'m>,
 }
 
 /// Cuts slices off memory, or only counts what they would take.
@@ -55,7 +58,7 @@ fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
     let fields = usize::from(limits.fields);
     let one_more = |count: usize| count.saturating_add(1);
     let cubic = bundle.path().space == SPACE_CUBIC;
-    let if_cubic = |count: usize| if cubic { count } else { 0 };
+    let blocks = grid.columns.saturating_mul(if cubic { 2 } else { 1 });
     let row_sheets = usize::from(limits.row_sheets);
     let node_row = |cutter: &mut Cutter<'m>, wanted: bool, fields: bool| {
         let if_wanted = |count: usize| if wanted { count } else { 0 };
@@ -63,6 +66,8 @@ fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
             start: cutter.take(if_wanted(one_more(grid.node_columns()))),
             label: cutter.take(if_wanted(row_layers)),
             layer: cutter.take::<Layer>(if_wanted(row_layers)),
+            right: cutter.take(if_wanted(row_layers)),
+            middle: cutter.take::<Layer>(if cubic { if_wanted(row_layers) } else { 0 }),
             field: cutter.take::<[i16; 2]>(if fields { if_wanted(row_layers) } else { 0 }),
         }
     };
@@ -94,10 +99,21 @@ fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
         },
         rows: core::array::from_fn(|row| node_row(cutter, cubic || row == 1 || row == 2, fields > 0)),
         halfway: node_row(cutter, cubic, false),
-        sheets: RowSheets {
-            start: cutter.take(one_more(grid.columns)),
-            sheet: cutter.take::<Sheet>(row_sheets),
-            middle: cutter.take(if_cubic(row_sheets)),
+        sheets: RowSheets { start: cutter.take(one_more(grid.columns)), sheet: cutter.take::<Sheet>(row_sheets) },
+        plan: Plan {
+            // Runs of one block each would have two edges a block.
+            edge: cutter.take::<Edge>(blocks.saturating_mul(2)),
+            run: cutter.take::<Run>(blocks),
+            mixed: cutter.take::<Mixed>(blocks),
+            edges: 0,
+            runs: 0,
+            mixes: 0,
+            last: [0; 2],
+            strip: None,
+            row: 0,
+            smooth: 0,
+            torn: 0,
+            tests: 0,
         },
     }
 }

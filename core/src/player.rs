@@ -1,17 +1,14 @@
 //! The player: new, seek, row. Keys are decoded into the caller's memory by `seek`, pixels are made by `row`.
 
 use crate::coder::Decoder;
-use crate::coverage::Chart;
-use crate::fixed::PlayUv;
-use crate::format::{self, Limits, SPACE_CUBIC, STRIP};
+use crate::draw::{Colours, Drawing, Probes};
+use crate::format::{self, Limits, SPACE_CUBIC};
 use crate::key::Nothing;
-use crate::lists::{CHART, FIELD};
 use crate::memory::{self, Workspace};
 use crate::record::{Place, SLICE_COST, Shape};
 use crate::row::Around;
-use crate::sheet::Part;
-use crate::span::{self, Test};
 use crate::timeline::Moment;
+use crate::work::{Probe, Work};
 use crate::{Bundle, MemoryError};
 
 /// A frame number.
@@ -28,36 +25,6 @@ pub enum ByteOrder {
     BigEndian,
     /// Least significant byte first.
     LittleEndian,
-}
-
-/// Work done since the last `seek`, for figures and overlays.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub struct Work {
-    /// Keys that the seek decoded whole, or whose last slice it decoded.
-    pub keys: u32,
-    /// Slices of keys that it decoded: a slice is a row of nodes, or the lists of a few rows of cells.
-    pub slices: u32,
-    /// Bytes that it read of those keys' records.
-    pub record_bytes: u32,
-    /// Layers interpolated in time.
-    pub layers: u32,
-    /// Layers worked out halfway between two rows of nodes.
-    pub middles: u32,
-    /// Pixels drawn in smooth cells.
-    pub smooth_pixels: u32,
-    /// Pixels drawn in torn cells.
-    pub torn_pixels: u32,
-    /// Coverage tests made for them.
-    pub coverage_tests: u32,
-}
-
-/// Where a pixel comes from.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub struct Probe {
-    /// The label of the sheet that shows.
-    pub label: u8,
-    /// Its position in the source image, Q15.16 texels.
-    pub at: PlayUv,
 }
 
 /// The last key decoded, and how much of what led to it is known.
@@ -253,13 +220,14 @@ impl<'a> Player<'a> {
     /// cells also interpolates the layers of two rows of nodes, or of one where the row of cells above was the last drawn: at most
     /// [`Limits::row_layers`] each. Never allocates, never waits.
     pub fn row(&mut self, y: u32, out: &mut [u16]) {
-        let texture = self.bundle.texture();
         if !self.ready(y) {
             return;
         }
-        let Ok(palette) = <&[u16; 256]>::try_from(&*self.space.palette) else { return };
-        let drawing = Drawing::new(self.bundle, &self.space);
-        drawing.row(y, out, &mut self.work, |uv, _| palette.get(usize::from(texture.texel(uv))).copied().unwrap_or(0));
+        let texture = self.bundle.texture();
+        let (mut drawing, palette) = Drawing::new(self.bundle, &mut self.space);
+        let Ok(palette) = <&[u16; 256]>::try_from(palette) else { return };
+        let colour = |texel: u8| palette.get(usize::from(texel)).copied().unwrap_or(0);
+        drawing.row(y, out, &mut self.work, &Colours { texture, colour });
     }
 
     /// Like [`Player::row`], but says where each pixel comes from instead of its colour.
@@ -267,8 +235,8 @@ impl<'a> Player<'a> {
         if !self.ready(y) {
             return;
         }
-        let drawing = Drawing::new(self.bundle, &self.space);
-        drawing.row(y, out, &mut self.work, |at, label| Probe { label, at });
+        let (mut drawing, _) = Drawing::new(self.bundle, &mut self.space);
+        drawing.row(y, out, &mut self.work, &Probes);
     }
 
     /// Loads the row of cells that row `y` is in; false below the screen.
@@ -277,6 +245,7 @@ impl<'a> Player<'a> {
         let inside = y < self.bundle.size().1;
         if inside && self.loaded != Some(row) {
             self.load(row);
+            self.space.plan.strip = None;
         }
         inside
     }
@@ -397,58 +366,5 @@ impl<'a> Player<'a> {
             self.work.keys = self.work.keys.wrapping_add(u32::from(coming.done == coming.slices));
         }
         self.work.record_bytes = self.work.record_bytes.wrapping_add(bytes.saturating_sub(coming.bits.left()) as u32);
-    }
-}
-
-/// A loaded row of cells, ready to be drawn.
-struct Drawing<'d, 'a> {
-    bundle: &'d Bundle<'a>,
-    space: &'d Workspace<'a>,
-}
-
-impl<'d, 'a> Drawing<'d, 'a> {
-    const fn new(bundle: &'d Bundle<'a>, space: &'d Workspace<'a>) -> Self {
-        Self { bundle, space }
-    }
-
-    /// Draws pixel row `y`, which lies in the loaded row of cells; `make` turns a position and its label into a pixel.
-    #[inline(always)]
-    fn row<T: Default>(&self, y: u32, out: &mut [T], work: &mut Work, make: impl Fn(PlayUv, u8) -> T) {
-        let cell = self.bundle.grid().log2;
-        let cubic = self.bundle.path().space == SPACE_CUBIC;
-        let log2 = if cubic { cell.wrapping_sub(1) } else { cell };
-        let step = y & (1u32 << cell).wrapping_sub(1);
-        let texture = self.bundle.texture();
-        let [_, top, bottom, _] = &self.space.rows;
-        let drawn = out.len().min(self.bundle.size().0 as usize);
-        let out = out.get_mut(..drawn).unwrap_or(&mut []);
-        for (column, pixels) in out.chunks_mut(1 << log2).enumerate() {
-            let (column, half) = if cubic { (column >> 1, Some(column & 1 == 1)) } else { (column, None) };
-            let rows = [top, &self.space.halfway, bottom];
-            let part = Part { sheets: &self.space.sheets, rows, half, step, log2: cell };
-            let (first, sheets) = self.space.sheets.cell(column);
-            let Some((back, front)) = sheets.split_last() else {
-                // Only a broken bundle has a cell without sheets.
-                pixels.fill_with(T::default);
-                continue;
-            };
-            let count = pixels.len() as u32;
-            span::all(pixels, part.span(first.wrapping_add(front.len()), back), &texture, |uv| make(uv, back.label()));
-            // Back to front: the frontmost sheet that covers a pixel has the last word.
-            for (place, sheet) in front.iter().enumerate().rev() {
-                let index = first.wrapping_add(place);
-                let record = self.bundle.label(sheet.label());
-                let test = Test {
-                    chart: (sheet.test() != FIELD).then(|| Chart::new(&record)),
-                    fields: (sheet.test() != CHART).then(|| part.fields(sheet)),
-                    strip: sheet.test() != CHART && record.flags & STRIP != 0,
-                    texture,
-                };
-                span::covered(pixels, part.span(index, sheet), &test, |uv| make(uv, sheet.label()));
-                work.coverage_tests = work.coverage_tests.wrapping_add(count);
-            }
-            let kind = if front.is_empty() { &mut work.smooth_pixels } else { &mut work.torn_pixels };
-            *kind = kind.wrapping_add(count);
-        }
     }
 }

@@ -1,19 +1,18 @@
 //! The sheets of a row of cells at one moment: where each one's corners and middles are.
 //! Rows of nodes come from `row`, sheet lists from the caller's memory; spans go to `span`.
 
-use crate::fixed::{PlayUv, part};
+use crate::fixed::PlayUv;
 use crate::grid::Grid;
 use crate::lists::Lists;
-use crate::row::{Layer, NodeRow};
-use crate::span::{Fields, Span};
+use crate::row::{Layer, NodeRow, Walk, partner};
 
 /// One sheet of a cell, in caller's memory: its label, its test, and where its layers at the cell's left and right edge stand in the rows
 /// above, halfway down and below. Halfway there is only where space is cubic.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Sheet {
-    left: [u16; 3],
-    right: [u16; 3],
+    /// Above, halfway down, below: left and right.
+    nodes: [[u16; 2]; 3],
     label: u8,
     test: u8,
 }
@@ -23,6 +22,13 @@ impl Sheet {
     #[must_use]
     pub const fn label(&self) -> u8 {
         self.label
+    }
+
+    /// Its layers at the cell's left and right edge in row `place` of the three.
+    #[must_use]
+    #[inline(always)]
+    pub fn nodes(&self, place: usize) -> Option<[u16; 2]> {
+        self.nodes.get(place).copied()
     }
 
     /// The sheet's coverage test: one of [`crate::lists`]'s.
@@ -39,8 +45,6 @@ pub struct RowSheets<'m> {
     pub start: &'m mut [u16],
     /// Front to back.
     pub sheet: &'m mut [Sheet],
-    /// Where space is cubic, every sheet's positions halfway across: above, halfway down, below.
-    pub middle: &'m mut [[Layer; 3]],
 }
 
 /// The rows of nodes that bound a row of cells: above, halfway down, below. Where space is linear, the middle one is not looked at.
@@ -49,29 +53,25 @@ pub type Rows<'r, 'm> = [&'r NodeRow<'m>; 3];
 impl RowSheets<'_> {
     /// Looks up the corners of every sheet that `lists` names in `row`. A sheet without a layer at a corner is left out:
     /// only broken bundles have such.
+    #[inline(never)]
     pub fn fill(&mut self, grid: Grid, row: usize, lists: &Lists<'_>, rows: Rows<'_, '_>, cubic: bool) {
         let mut cursor = lists.row(row);
         let mut count = 0usize;
-        for column in 0..grid.columns {
-            if let Some(start) = self.start.get_mut(column) {
-                *start = count as u16;
-            }
-            let right = column.wrapping_add(1);
+        let [mut above, mut between, mut below] = rows.map(NodeRow::walk);
+        let [top, middle, bottom] = rows.map(NodeRow::links);
+        for start in self.start.iter_mut().take(grid.columns) {
+            *start = count as u16;
+            above.step();
+            between.step();
+            below.step();
             let listed = lists.sheets(cursor);
             for (index, &label) in listed.labels.iter().enumerate() {
                 // Halfway down there is a layer wherever there is one above and below.
-                let edge = |column: usize| {
-                    let [top, middle, bottom] = rows;
-                    let halfway = if cubic { middle.find(column, label)? } else { 0 };
-                    Some([top.find(column, label)?, halfway, bottom.find(column, label)?])
-                };
-                if let (Some(left), Some(right)) = (edge(column), edge(right))
+                let halfway = if cubic { corner(&between, middle, label) } else { Some([0, 0]) };
+                if let (Some(above), Some(halfway), Some(below)) = (corner(&above, top, label), halfway, corner(&below, bottom, label))
                     && let Some(sheet) = self.sheet.get_mut(count)
                 {
-                    *sheet = Sheet { left, right, label, test: listed.test(index) as u8 };
-                    if cubic {
-                        self.halve(count, column, rows);
-                    }
+                    *sheet = Sheet { nodes: [above, halfway, below], label, test: listed.test(index) as u8 };
                     count = count.wrapping_add(1);
                 }
             }
@@ -79,19 +79,6 @@ impl RowSheets<'_> {
         }
         if let Some(start) = self.start.get_mut(grid.columns) {
             *start = count as u16;
-        }
-    }
-
-    /// Works out the middles of sheet `index`, which lies in the cell in `column`.
-    fn halve(&mut self, index: usize, column: usize, rows: Rows<'_, '_>) {
-        let Some(&Sheet { left, right, label, .. }) = self.sheet.get(index) else { return };
-        let points = rows.into_iter().zip(left.into_iter().zip(right));
-        for (place, (row, (from, to))) in points.enumerate() {
-            let before = column.checked_sub(1).and_then(|column| row.find(column, label));
-            let after = row.find(column.wrapping_add(2), label);
-            if let Some(slot) = self.middle.get_mut(index).and_then(|middles| middles.get_mut(place)) {
-                *slot = Layer::middle(before.map(|at| row.layer(at)), row.layer(from), row.layer(to), after.map(|at| row.layer(at)));
-            }
         }
     }
 
@@ -104,60 +91,50 @@ impl RowSheets<'_> {
     }
 }
 
-/// A part of a cell along one row of pixels: all of it, or a half where space is cubic.
+/// The layers of `label` at a node of a row and at the one to the right of it.
+#[inline(always)]
+fn corner(walk: &Walk<'_>, links: &[u16], label: u8) -> Option<[u16; 2]> {
+    let left = walk.find(label)?;
+    Some([left as u16, partner(*links.get(left)?)?])
+}
+
+/// A block of a cell: all of it, or a quarter where space is cubic; with straight lines in between.
 #[derive(Clone, Copy, Debug)]
-pub struct Part<'p, 'm> {
-    /// The sheets.
-    pub sheets: &'p RowSheets<'m>,
+pub struct Block<'p, 'm> {
     /// The rows of nodes at the upper and the lower edge of the row of cells, and halfway down where space is cubic.
     pub rows: Rows<'p, 'm>,
-    /// The side: `None`: all of the cell, false: its left half, true: its right half.
-    pub half: Option<bool>,
-    /// How far down the cell the pixels are.
-    pub step: u32,
-    /// The cell is 2^this pixels wide and high.
-    pub log2: u32,
+    /// Cells are quartered: which quarter this is, rightwards and downwards.
+    pub quarter: Option<[bool; 2]>,
 }
 
-impl Part<'_, '_> {
-    /// The sheet at `index` along the row.
+/// The positions at the corners of a block: above left and right, below left and right.
+pub type Corners = [PlayUv; 4];
+
+impl Block<'_, '_> {
+    /// Where `sheet` has the block's corners.
     #[must_use]
-    #[inline]
-    pub fn span(&self, index: usize, sheet: &Sheet) -> Span {
+    #[inline(always)]
+    pub fn corners(&self, sheet: &Sheet) -> Corners {
         let [top, halfway, bottom] = self.rows;
-        let Some(right) = self.half else {
-            let edge = |[above, _, below]: [u16; 3]| down(top.layer(above), bottom.layer(below), self.step, self.log2);
-            return Span::between(edge(sheet.left), edge(sheet.right), self.log2);
+        let [[a, d], [b, e], [c, f]] = sheet.nodes;
+        let Some([right, lower]) = self.quarter else {
+            return [top.layer(a), top.layer(d), bottom.layer(c), bottom.layer(f)].map(Layer::uv);
         };
-        let log2 = self.log2.wrapping_sub(1);
-        let (lower, step) = (self.step >> log2 != 0, self.step & (1u32 << log2).wrapping_sub(1));
-        let outer = |[above, between, below]: [u16; 3]| {
-            let (above, below) =
-                if lower { (halfway.layer(between), bottom.layer(below)) } else { (top.layer(above), halfway.layer(between)) };
-            down(above, below, step, log2)
+        let (above, below) = if lower { ((halfway, b, e), (bottom, c, f)) } else { ((top, a, d), (halfway, b, e)) };
+        let edge = |(row, left, partner): (&NodeRow<'_>, u16, u16)| {
+            if right { [row.halfway(left), row.layer(partner)] } else { [row.layer(left), row.halfway(left)] }
         };
-        let [above, between, below] = self.sheets.middle.get(index).copied().unwrap_or_default();
-        let inner = if lower { down(between, below, step, log2) } else { down(above, between, step, log2) };
-        if right { Span::between(inner, outer(sheet.right), log2) } else { Span::between(outer(sheet.left), inner, log2) }
+        let ([a, b], [c, d]) = (edge(above), edge(below));
+        [a, b, c, d].map(Layer::uv)
     }
 
-    /// The fields of a sheet along the row: straight from edge to edge of the cell, whatever space is.
+    /// Field `which` of `sheet` at the cell's corners, Q16 pixels: straight from edge to edge of the cell, whatever space is.
     #[must_use]
-    #[inline]
-    pub fn fields(&self, sheet: &Sheet) -> Fields {
+    #[inline(always)]
+    pub fn field(&self, sheet: &Sheet, which: usize) -> [i32; 4] {
         let [top, _, bottom] = self.rows;
-        let wide = |field: i16| i32::from(field).wrapping_shl(8);
-        let edge = |[above, _, below]: [u16; 3]| {
-            let ([a, b], [c, d]) = (top.field(above), bottom.field(below));
-            [part(wide(a), wide(c), self.step, self.log2), part(wide(b), wide(d), self.step, self.log2)]
-        };
-        let fields = Fields::between(edge(sheet.left), edge(sheet.right), self.log2);
-        if self.half == Some(true) { fields.after(1 << self.log2.wrapping_sub(1)) } else { fields }
+        let [[a, d], _, [c, f]] = sheet.nodes;
+        let wide = |fields: [i16; 2]| i32::from(if which == 0 { fields[0] } else { fields[1] }).wrapping_shl(8);
+        [top.field(a), top.field(d), bottom.field(c), bottom.field(f)].map(wide)
     }
-}
-
-/// The position `step` pixels down the way from `top` to `bottom`, which are 2^`log2` pixels apart.
-fn down(top: Layer, bottom: Layer, step: u32, log2: u32) -> PlayUv {
-    let (top, bottom) = (top.uv(), bottom.uv());
-    PlayUv { u: part(top.u, bottom.u, step, log2), v: part(top.v, bottom.v, step, log2) }
 }

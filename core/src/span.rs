@@ -1,11 +1,112 @@
-//! Spans: the inner loops. A span is one sheet along one row of pixels of a cell.
-//! Its ends come from `cell`; pixels go to the caller's row.
+//! Spans: the inner loops. Pixels of a row are made from positions that step along it: in runs of blocks that show one sheet each, or
+//! block by block where several sheets take turns. What is where comes from `plan`; pixels go to the caller's row.
 
 use crate::atlas::Texture;
-use crate::coverage::Chart;
+use crate::coverage::{Chart, Cover};
 use crate::fixed::PlayUv;
+use crate::plan::{Edge, halves};
+use crate::sheet::Corners;
 
-/// A sheet along a row of a cell: the position at its first pixel, and the step to the next.
+/// A position in a window: v in its lower WIDTH + ROWS bits, WIDTH of them its fraction, u above, its upper WIDTH bits the texel.
+#[derive(Clone, Copy, Debug)]
+pub struct Packed<const WIDTH: u32, const ROWS: u32>(pub u32);
+
+impl<const WIDTH: u32, const ROWS: u32> Packed<WIDTH, ROWS> {
+    const BITS: u32 = WIDTH + ROWS;
+    const LOW: u32 = (1 << Self::BITS) - 1;
+    /// How far an edge's v is shifted down.
+    const DROP: u32 = 31 - Self::BITS;
+    /// How far the texel's column is shifted down.
+    const ACROSS: u32 = 32 - WIDTH;
+    /// The texel's row, which stands where its place in the window has it.
+    const DOWN: u32 = Self::LOW & !((1 << WIDTH) - 1);
+
+    #[inline(always)]
+    const fn new([u, v]: [u32; 2]) -> Self {
+        Self((u & !Self::LOW) | v >> Self::DROP)
+    }
+
+    /// The 2^`log2`-th part of the way from `left` to `right`, rounded to nearest.
+    #[inline(always)]
+    const fn step(left: [u32; 2], right: [u32; 2], log2: u32) -> u32 {
+        let [half_u, half_v] = halves(WIDTH, ROWS);
+        let u = right[0].wrapping_sub(left[0]).wrapping_add(half_u.wrapping_shl(log2));
+        let v = right[1].wrapping_sub(left[1]).wrapping_add(half_v.wrapping_shl(log2));
+        let u = u & !(Self::LOW.wrapping_shl(log2) | 1u32.wrapping_shl(log2).wrapping_sub(1));
+        let v = v as i32 >> Self::DROP.wrapping_add(log2);
+        (v as u32).wrapping_add((u as i32 >> log2) as u32)
+    }
+
+    /// The texel's place in its window, below 2^(WIDTH + ROWS).
+    #[must_use]
+    #[inline(always)]
+    pub const fn texel(self) -> usize {
+        (self.0 >> Self::ACROSS | self.0 & Self::DOWN) as usize
+    }
+
+    /// The position in the picture, for a window from `row` on.
+    #[must_use]
+    pub fn at(self, row: u16) -> PlayUv {
+        let u = (self.0 >> Self::BITS).wrapping_shl(Self::BITS.wrapping_add(WIDTH).wrapping_sub(16));
+        let v = (self.0 & Self::LOW).wrapping_shl(16u32.wrapping_sub(WIDTH)).wrapping_add(u32::from(row).wrapping_shl(16));
+        PlayUv { u: u as i32, v: v as i32 }
+    }
+}
+
+/// Paints `out`, a run's blocks of `PIXELS` pixels each, and steps its edges down a row.
+#[inline(always)]
+pub fn run<T, const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(
+    edges: &mut [Edge],
+    out: &mut [T],
+    make: impl Fn(Packed<WIDTH, ROWS>) -> T,
+) {
+    let mut edges = edges.iter_mut();
+    let Some(mut left) = edges.next().map(Edge::advance) else { return };
+    for (edge, pixels) in edges.zip(out.as_chunks_mut::<PIXELS>().0) {
+        let right = edge.advance();
+        let step = Packed::<WIDTH, ROWS>::step(left, right, PIXELS.trailing_zeros());
+        let Packed(mut at) = Packed::<WIDTH, ROWS>::new(left);
+        for pixel in pixels {
+            *pixel = make(Packed(at));
+            at = at.wrapping_add(step);
+        }
+        left = right;
+    }
+}
+
+/// Like [`run`], with blocks of any 2^`log2` pixels: every four the position is packed anew, so that steps' rounding does not add up.
+#[inline(always)]
+pub fn any_run<T, const WIDTH: u32, const ROWS: u32>(
+    edges: &mut [Edge],
+    out: &mut [T],
+    log2: u32,
+    make: impl Fn(Packed<WIDTH, ROWS>) -> T,
+) {
+    let mut edges = edges.iter_mut();
+    let Some(mut left) = edges.next().map(Edge::advance) else { return };
+    let mut out = out;
+    for edge in edges {
+        let Some((mut pixels, rest)) = out.split_at_mut_checked(1 << log2) else { return };
+        out = rest;
+        let right = edge.advance();
+        let across = |from: u32, to: u32| to.wrapping_sub(from) as i32 >> log2;
+        let [u, v] = [across(left[0], right[0]), across(left[1], right[1])];
+        let step = Packed::<WIDTH, ROWS>::step(left, right, log2);
+        while !pixels.is_empty() {
+            let (four, rest) = pixels.split_at_mut(pixels.len().min(4));
+            pixels = rest;
+            let Packed(mut at) = Packed::<WIDTH, ROWS>::new(left);
+            for pixel in four {
+                *pixel = make(Packed(at));
+                at = at.wrapping_add(step);
+            }
+            left = [left[0].wrapping_add((u as u32).wrapping_shl(2)), left[1].wrapping_add((v as u32).wrapping_shl(2))];
+        }
+        left = right;
+    }
+}
+
+/// A sheet along a row of a block: the position at its first pixel, and the step to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Span {
     /// At the first pixel.
@@ -14,19 +115,27 @@ pub struct Span {
     pub step: PlayUv,
 }
 
+/// The value `step` / 2^`log2` of the way from `from` to `to`, rounded down.
+const fn down(from: i32, to: i32, step: u32, log2: u32) -> i32 {
+    // In two parts, because the product does not fit.
+    let far = to.wrapping_sub(from);
+    let rest = far & 1i32.wrapping_shl(log2).wrapping_sub(1);
+    let step = step as i32;
+    from.wrapping_add((far >> log2).wrapping_mul(step)).wrapping_add(rest.wrapping_mul(step) >> log2)
+}
+
 impl Span {
-    /// The span between the cell's left edge and its right edge, 2^`log2` pixels further; steps rounded to
-    /// nearest, so that the last pixel is at most 2^(log2 - 1) / 65536 texel off.
+    /// The span of row `row` of a block of 2^`log2` pixels, whose corners are given; steps rounded to nearest, so that the last pixel is at
+    /// most 2^(log2 - 1) / 65536 texel off.
     #[must_use]
-    pub const fn between(from: PlayUv, to: PlayUv, log2: u32) -> Self {
+    #[inline]
+    pub const fn new([a, b, c, d]: Corners, row: u32, log2: u32) -> Self {
+        let from = PlayUv { u: down(a.u, c.u, row, log2), v: down(a.v, c.v, row, log2) };
+        let to = PlayUv { u: down(b.u, d.u, row, log2), v: down(b.v, d.v, row, log2) };
         let half = (1i32 << log2) >> 1;
-        Self {
-            from,
-            step: PlayUv {
-                u: to.u.wrapping_sub(from.u).wrapping_add(half) >> log2,
-                v: to.v.wrapping_sub(from.v).wrapping_add(half) >> log2,
-            },
-        }
+        let step =
+            PlayUv { u: to.u.wrapping_sub(from.u).wrapping_add(half) >> log2, v: to.v.wrapping_sub(from.v).wrapping_add(half) >> log2 };
+        Self { from, step }
     }
 
     /// The position `pixels` pixels on.
@@ -45,72 +154,69 @@ impl PlayUv {
     }
 }
 
-/// Paints every pixel of `out`; `make` turns a position into a pixel. Positions outside the picture count as its edge.
+/// Paints the pixels of `out` that `shown` names, a bit each; `make` turns a position into a pixel. Positions outside the picture count as its edge.
 #[inline(always)]
-pub fn all<T>(out: &mut [T], span: Span, texture: &Texture<'_>, make: impl Fn(PlayUv) -> T) {
+pub fn paint<T>(out: &mut [T], mut shown: u32, span: Span, texture: &Texture<'_>, make: impl Fn(PlayUv) -> T) {
     let mut uv = span.from;
     // A span is straight: if both its ends are inside, all of it is.
-    if texture.holds(uv) && texture.holds(span.at(out.len())) {
-        for pixel in out {
-            *pixel = make(uv);
-            uv = uv.plus(span.step);
-        }
-    } else {
-        for pixel in out {
-            *pixel = make(texture.clamp(uv));
-            uv = uv.plus(span.step);
-        }
-    }
-}
-
-/// A sheet's fields along a row of a cell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Fields {
-    from: [i32; 2],
-    step: [i32; 2],
-}
-
-impl Fields {
-    /// The fields between a cell's left edge and its right edge, 2^`log2` pixels further, Q16 pixels.
-    #[must_use]
-    pub const fn between([a, b]: [i32; 2], [c, d]: [i32; 2], log2: u32) -> Self {
-        let half = (1i32 << log2) >> 1;
-        let step = [c.wrapping_sub(a).wrapping_add(half) >> log2, d.wrapping_sub(b).wrapping_add(half) >> log2];
-        Self { from: [a, b], step }
-    }
-
-    /// The same fields from `pixels` pixels on.
-    #[must_use]
-    pub const fn after(self, pixels: i32) -> Self {
-        let ([a, b], [da, db]) = (self.from, self.step);
-        Self { from: [a.wrapping_add(da.wrapping_mul(pixels)), b.wrapping_add(db.wrapping_mul(pixels))], step: self.step }
-    }
-}
-
-/// What decides whether a sheet shows at a pixel: its chart, its fields, or both.
-#[derive(Clone, Copy, Debug)]
-pub struct Test<'t> {
-    /// The chart, where it is tested.
-    pub chart: Option<Chart>,
-    /// The fields, where they are tested.
-    pub fields: Option<Fields>,
-    /// The second field counts too.
-    pub strip: bool,
-    /// Where charts lie.
-    pub texture: Texture<'t>,
-}
-
-/// Paints the pixels of `out` at which `test` lets the span show.
-#[inline(always)]
-pub fn covered<T>(out: &mut [T], span: Span, test: &Test<'_>, make: impl Fn(PlayUv) -> T) {
-    let mut uv = span.from;
-    let Fields { from: [mut a, mut b], step: [da, db] } = test.fields.unwrap_or(Fields { from: [1, 1], step: [0, 0] });
+    let inside = texture.holds(uv) && texture.holds(span.at(out.len().wrapping_sub(1)));
     for pixel in out {
-        let inside = a > 0 && (!test.strip || b > 0);
-        if inside && test.chart.is_none_or(|chart| chart.covers(uv, &test.texture)) {
-            *pixel = make(test.texture.clamp(uv));
+        if shown & 1 != 0 {
+            *pixel = make(if inside { uv } else { texture.clamp(uv) });
+        }
+        shown >>= 1;
+        uv = uv.plus(span.step);
+    }
+}
+
+/// A field along a row of a block, Q16 pixels.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Field {
+    from: i32,
+    step: i32,
+}
+
+impl Field {
+    /// The field of row `row` of a cell of 2^`log2` pixels from pixel `first` on, given what it is at the cell's corners, Q16 pixels.
+    #[must_use]
+    #[inline(always)]
+    pub const fn new([a, b, c, d]: [i32; 4], row: u32, log2: u32, first: u32) -> Self {
+        let half = (1i32 << log2) >> 1;
+        let (from, to) = (down(a, c, row, log2), down(b, d, row, log2));
+        let step = to.wrapping_sub(from).wrapping_add(half) >> log2;
+        Self { from: from.wrapping_add(step.wrapping_mul(first as i32)), step }
+    }
+
+    /// At which of the next `pixels` pixels the field is positive: a bit each.
+    #[must_use]
+    #[inline(always)]
+    pub fn positive(&self, pixels: usize) -> u32 {
+        let mut field = self.from;
+        let mut shown = 0u32;
+        for pixel in 0..pixels as u32 {
+            // The sign of what is below zero where the field is above.
+            shown |= (field.wrapping_neg() as u32 >> 31).wrapping_shl(pixel);
+            field = field.wrapping_add(self.step);
+        }
+        shown
+    }
+}
+
+/// Those of the pixels that `shown` names, of a span of `pixels`, at which the span lies inside `chart`.
+#[inline(always)]
+#[must_use]
+pub fn inside(chart: &Chart, mut shown: u32, pixels: usize, span: Span, texture: &Texture<'_>) -> u32 {
+    match chart.cover(&[span.from, span.at(pixels.wrapping_sub(1))]) {
+        Cover::Nothing => return 0,
+        Cover::All => return shown,
+        Cover::Part => {}
+    }
+    let mut uv = span.from;
+    for pixel in 0..pixels as u32 {
+        if !chart.covers(uv, texture) {
+            shown &= !1u32.wrapping_shl(pixel);
         }
         uv = uv.plus(span.step);
-        (a, b) = (a.wrapping_add(da), b.wrapping_add(db));
     }
+    shown
 }

@@ -8,9 +8,9 @@ use source::Source;
 use std::collections::BTreeMap;
 
 /// The core's modules from the bottom up: each may use those before it, none after it.
-const ORDER: [&str; 21] = [
-    "error", "fixed", "format", "coder", "grid", "lists", "key", "predict", "field", "nodes", "record", "atlas", "coverage", "span",
-    "bundle", "timeline", "cell", "memory", "player", "graphics", "lib",
+const ORDER: [&str; 25] = [
+    "error", "fixed", "format", "coder", "grid", "lists", "key", "predict", "field", "nodes", "record", "atlas", "coverage", "bundle",
+    "timeline", "row", "sheet", "plan", "span", "memory", "work", "draw", "player", "graphics", "lib",
 ];
 
 /// Crates that only certain files (or folders, with a slash at the end) may name, so that they can be replaced there.
@@ -24,8 +24,14 @@ const ROOMS: [(&str, &[&str]); 5] = [
 ];
 
 /// The packages, and which of ours each may depend on.
-const PACKAGES: [(&str, &[&str]); 4] =
-    [("core", &[]), ("baker", &["cubist-core"]), ("player-host", &["cubist-core", "cubist-baker"]), ("player-mcu/proof", &["cubist-core"])];
+const PACKAGES: [(&str, &[&str]); 6] = [
+    ("core", &[]),
+    ("baker", &["cubist-core"]),
+    ("player-host", &["cubist-core", "cubist-baker"]),
+    ("player-mcu/proof", &["cubist-core"]),
+    ("player-mcu/qemu", &["cubist-core"]),
+    ("player-mcu/bench", &["cubist-core"]),
+];
 
 const LONGEST_FILE: usize = 600;
 

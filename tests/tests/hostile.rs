@@ -272,8 +272,8 @@ fn cells_show_no_more_sheets_than_the_bundle_says() {
         })
         .expect("it plays");
         assert_eq!(torn > 0, cell_sheets > 1, "{cell_sheets} sheets");
-        // The bound is met somewhere: it does not merely hold because cells have few sheets.
-        assert!(cell_sheets < 3 || tests > torn, "{cell_sheets} sheets: {tests} tests of {torn} pixels");
+        // Most of a torn cell is told from its corners; where outlines run there is something to test.
+        assert!(cell_sheets < 2 || tests > 0, "{cell_sheets} sheets: {tests} tests of {torn} pixels");
     }
 }
 

@@ -1,0 +1,235 @@
+//! Draws rows of pixels: plans a strip when its first row is asked for, then runs and mixed blocks of one row after the other.
+//! The plan is in the caller's memory; pixels go to the caller's row, as `player` asks.
+
+use crate::Bundle;
+use crate::atlas::Texture;
+use crate::coverage::Chart;
+use crate::fixed::PlayUv;
+use crate::format::{LabelRecord, STRIP};
+use crate::lists::{CHART, FIELD};
+use crate::memory::Workspace;
+use crate::plan::{Edge, Mixed, Plan, Run, Site};
+use crate::span::{self, Field, Packed, Span};
+use crate::work::{Probe, Work};
+
+/// What pixels are made of positions.
+pub trait Paint {
+    /// A pixel.
+    type Pixel: Copy + Default;
+    /// Made so often that loops of their own pay.
+    const OFTEN: bool;
+
+    /// The pixel at `uv`, which is inside the picture.
+    fn at(&self, uv: PlayUv, label: u8) -> Self::Pixel;
+
+    /// A run's pixels, in windows of 2^ROWS rows of 2^WIDTH texels, `TEXELS` in all; `log2`: of a block's pixels.
+    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [Self::Pixel], log2: u32);
+}
+
+/// Colours, by way of the source image.
+#[derive(Debug)]
+pub struct Colours<'t, F> {
+    /// The source image.
+    pub texture: Texture<'t>,
+    /// A texel's colour.
+    pub colour: F,
+}
+
+impl<F: Fn(u8) -> u16> Paint for Colours<'_, F> {
+    type Pixel = u16;
+    const OFTEN: bool = true;
+
+    #[inline(always)]
+    fn at(&self, uv: PlayUv, _: u8) -> u16 {
+        (self.colour)(self.texture.texel(uv))
+    }
+
+    // A function of its own: the loop needs all registers.
+    #[inline(never)]
+    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [u16], log2: u32) {
+        let from = usize::from(run.row).wrapping_shl(WIDTH);
+        // The plan keeps windows inside the picture.
+        let Some(window) = self.texture.texels.get(from..).and_then(<[u8]>::first_chunk::<TEXELS>) else { return };
+        let make = |at: Packed<WIDTH, ROWS>| (self.colour)(window.get(at.texel()).copied().unwrap_or(0));
+        // Blocks of four in a picture 512 wide are the rule, and have a loop of their own.
+        if (WIDTH, log2) == (9, 2) {
+            span::run::<_, WIDTH, ROWS, 4>(edges, out, make);
+        } else {
+            span::any_run(edges, out, log2, make);
+        }
+    }
+}
+
+/// Where pixels come from.
+#[derive(Debug)]
+pub struct Probes;
+
+impl Paint for Probes {
+    type Pixel = Probe;
+    const OFTEN: bool = false;
+
+    fn at(&self, uv: PlayUv, label: u8) -> Probe {
+        Probe { label, at: uv }
+    }
+
+    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [Probe], log2: u32) {
+        let label = run.label as u8;
+        span::any_run(edges, out, log2, |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(run.row) });
+    }
+}
+
+/// A loaded row of cells, ready to be drawn.
+#[derive(Debug)]
+pub struct Drawing<'d, 'a> {
+    site: Site<'d, 'a, 'd>,
+    plan: &'d mut Plan<'a>,
+}
+
+impl<'d, 'a> Drawing<'d, 'a> {
+    /// The row of cells that `space` holds, and the palette.
+    pub fn new(bundle: &'d Bundle<'a>, space: &'d mut Workspace<'a>) -> (Self, &'d [u16])
+    where
+        'a: 'd,
+    {
+        let Workspace { rows: [_, top, bottom, _], halfway, sheets, plan, palette, .. } = space;
+        let site = Site { bundle, rows: [top, halfway, bottom], sheets };
+        (Self { site, plan }, palette)
+    }
+
+    /// Draws pixel row `y`, which lies in the row of cells.
+    #[inline(always)]
+    pub fn row<P: Paint>(&mut self, y: u32, out: &mut [P::Pixel], work: &mut Work, paint: &P) {
+        let log2 = self.site.log2();
+        let (strip, row) = (y >> log2, y & (1u32 << log2).wrapping_sub(1));
+        if self.plan.strip != Some(strip) || self.plan.row > row {
+            self.plan.make(&self.site, strip);
+        }
+        self.plan.skip_to(row);
+        let width = self.site.bundle.size().0 as usize;
+        let drawn = out.len().min(width);
+        let out = out.get_mut(..drawn).unwrap_or(&mut []);
+        let Plan { edge, run: runs, mixed, runs: count, mixes, .. } = &mut *self.plan;
+        for &run in runs.get(..*count).unwrap_or(&[]) {
+            let first = usize::from(run.edge);
+            let Some(edges) = edge.get_mut(first..=first.wrapping_add(run.blocks.into())) else { continue };
+            let from = usize::from(run.block).wrapping_shl(log2);
+            let to = usize::from(run.block).wrapping_add(run.blocks.into()).wrapping_shl(log2);
+            match out.get_mut(from..to) {
+                Some(pixels) => by_width(paint, run, edges, pixels, log2, self.site.bundle.texture().width_log2),
+                None => cut(paint, run, edges, out, log2, self.site.bundle.texture().width_log2),
+            }
+        }
+        let mixed = mixed.get(..*mixes).unwrap_or(&[]);
+        // Quarters of cells of eight pixels are the rule; with numbers that are known the code is a third shorter to run.
+        if P::OFTEN && (log2, self.site.bundle.grid().log2) == (2, 3) {
+            mix::<P, true>(&self.site, mixed, y, out, paint);
+        } else {
+            mix::<P, false>(&self.site, mixed, y, out, paint);
+        }
+        self.plan.row = row.wrapping_add(1);
+        work.smooth_pixels = work.smooth_pixels.wrapping_add(self.plan.smooth);
+        work.torn_pixels = work.torn_pixels.wrapping_add(self.plan.torn);
+        work.coverage_tests = work.coverage_tests.wrapping_add(self.plan.tests);
+    }
+}
+
+/// A run's pixels by the width of the picture: those that `plan` has windows for.
+#[inline(never)]
+fn by_width<P: Paint>(paint: &P, run: Run, edges: &mut [Edge], out: &mut [P::Pixel], log2: u32, width_log2: u32) {
+    match width_log2 {
+        8 => paint.run::<8, 5, 0x2000>(run, edges, out, log2),
+        9 => paint.run::<9, 5, 0x4000>(run, edges, out, log2),
+        _ => paint.run::<10, 4, 0x4000>(run, edges, out, log2),
+    }
+}
+
+/// A run that reaches past the end of `out`: block by block, and of the last only what there is.
+#[inline(never)]
+fn cut<P: Paint>(paint: &P, run: Run, edges: &mut [Edge], out: &mut [P::Pixel], log2: u32, width_log2: u32) {
+    let from = usize::from(run.block).wrapping_shl(log2);
+    let mut out = out.get_mut(from..).unwrap_or(&mut []);
+    for index in 0..usize::from(run.blocks) {
+        let (pixels, rest) = out.split_at_mut(out.len().min(1 << log2));
+        out = rest;
+        // Copies: an edge belongs to two blocks, and is stepped once.
+        let Some(&[left, right]) = edges.get(index..).and_then(<[Edge]>::first_chunk::<2>) else { break };
+        let mut whole = [P::Pixel::default(); 32];
+        if let Some(block) = whole.get_mut(..1 << log2) {
+            by_width(paint, run, &mut [left, right], block, log2, width_log2);
+        }
+        for (pixel, made) in pixels.iter_mut().zip(whole) {
+            *pixel = made;
+        }
+    }
+    for edge in edges {
+        edge.advance();
+    }
+}
+
+/// Mixed blocks pixel by pixel. EIGHT: they are quarters of cells of eight pixels.
+#[inline(never)]
+fn mix<P: Paint, const EIGHT: bool>(site: &Site<'_, '_, '_>, mixed: &[Mixed], y: u32, out: &mut [P::Pixel], paint: &P) {
+    let log2 = if EIGHT { 2 } else { site.log2() };
+    for mixed in mixed {
+        let first = usize::from(mixed.block).wrapping_shl(log2);
+        let last = first.wrapping_add(1 << log2).min(out.len());
+        let Some(pixels) = out.get_mut(first..last) else { break };
+        // The most frequent length has loops of its own.
+        match <&mut [P::Pixel; 4]>::try_from(&mut *pixels) {
+            Ok(four) if EIGHT => block::<P, EIGHT>(site, *mixed, y, four, paint),
+            _ => any_block(site, *mixed, y, pixels, paint),
+        }
+    }
+}
+
+/// A block of any length.
+#[inline(never)]
+fn any_block<P: Paint>(site: &Site<'_, '_, '_>, mixed: Mixed, y: u32, pixels: &mut [P::Pixel], paint: &P) {
+    block::<P, false>(site, mixed, y, pixels, paint);
+}
+
+/// One mixed block, front to back: the frontmost sheet that covers a pixel shows.
+#[inline(always)]
+fn block<P: Paint, const EIGHT: bool>(site: &Site<'_, '_, '_>, mixed: Mixed, y: u32, pixels: &mut [P::Pixel], paint: &P) {
+    let (log2, cell) = if EIGHT { (2, 3) } else { (site.log2(), site.bundle.grid().log2) };
+    let row = y & (1u32 << log2).wrapping_sub(1);
+    let texture = site.bundle.texture();
+    let block = if EIGHT { site.quarter(mixed.block.into(), y >> log2) } else { site.block(mixed.block.into(), y >> log2) };
+    let mut left = u32::MAX.wrapping_shr(32u32.wrapping_sub(pixels.len() as u32));
+    let mut sheets = mixed.sheets;
+    while sheets != 0 && left != 0 {
+        let place = usize::from(mixed.sheet).wrapping_add(sheets.trailing_zeros() as usize);
+        sheets &= sheets.wrapping_sub(1);
+        let Some(sheet) = site.sheets.sheet.get(place) else { break };
+        let mut shown = left;
+        // The last one covers what is left.
+        let tested = sheets != 0;
+        let record = if tested { site.bundle.label(sheet.label()) } else { LabelRecord::default() };
+        if tested && sheet.test() != CHART {
+            let step = y & (1u32 << cell).wrapping_sub(1);
+            let first = u32::from(mixed.block).wrapping_shl(log2) & (1u32 << cell).wrapping_sub(1);
+            let positive = |which: usize| Field::new(block.field(sheet, which), step, cell, first).positive(pixels.len());
+            shown &= positive(0);
+            if record.flags & STRIP != 0 {
+                shown &= positive(1);
+            }
+        }
+        if shown == 0 {
+            continue;
+        }
+        let span = Span::new(block.corners(sheet), row, log2);
+        if tested && sheet.test() != FIELD {
+            shown = span::inside(&Chart::new(&record), shown, pixels.len(), span, &texture);
+        }
+        if shown != 0 {
+            span::paint(pixels, shown, span, &texture, |uv| paint.at(uv, sheet.label()));
+            left &= !shown;
+        }
+    }
+    // Only a broken bundle has a cell without sheets.
+    for (index, pixel) in pixels.iter_mut().enumerate().filter(|_| left != 0) {
+        if left.wrapping_shr(index as u32) & 1 != 0 {
+            *pixel = P::Pixel::default();
+        }
+    }
+}

@@ -1,0 +1,456 @@
+//! What a strip of the screen shows, block by block, worked out once for all of its rows: where one sheet covers a block, and where
+//! several take turns. A strip is as many rows as a block is high. Sheets come from `sheet`; rows of pixels are drawn from it by `span`.
+//!
+//! Blocks that show one sheet stand in **runs**: neighbours of one label, whose common edges are stepped once a row. A run's
+//! positions lie in a **window** of the source image, so many rows of it that a position there is one 32-bit number.
+
+use crate::Bundle;
+use crate::coverage::{Chart, Cover};
+use crate::fixed::PlayUv;
+use crate::format::{MAX_SHEETS, SPACE_CUBIC, STRIP};
+use crate::lists::{CHART, FIELD};
+use crate::row::Layer;
+use crate::sheet::{Block, Corners, RowSheets, Rows, Sheet};
+
+/// A side of a block in a run, in caller's memory: where it stands at the strip's current row, and how far that is from row to row.
+/// u counts the picture's width as 2^32, v its window's rows as 2^31.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Edge {
+    /// Across.
+    pub u: u32,
+    /// Down.
+    pub v: u32,
+    /// A row further: across.
+    pub down_u: u32,
+    /// A row further: down.
+    pub down_v: u32,
+}
+
+impl Edge {
+    /// Steps to the next row; returns where it was.
+    #[inline(always)]
+    pub const fn advance(&mut self) -> [u32; 2] {
+        let was = [self.u, self.v];
+        (self.u, self.v) = (self.u.wrapping_add(self.down_u), self.v.wrapping_add(self.down_v));
+        was
+    }
+}
+
+/// Neighbouring blocks that show one sheet of one label, in caller's memory.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Run {
+    /// The first block, from the left.
+    pub block: u16,
+    /// How many there are. They have one edge more.
+    pub blocks: u16,
+    /// The first edge.
+    pub edge: u16,
+    /// The window's first row.
+    pub row: u16,
+    /// The label.
+    pub label: u16,
+}
+
+/// A block that is drawn pixel by pixel, in caller's memory.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Mixed {
+    /// The block, from the left.
+    pub block: u16,
+    /// Its cell's first sheet.
+    pub sheet: u16,
+    /// Which of the cell's sheets it can show, a bit each; the last of them covers what is left.
+    pub sheets: u16,
+}
+
+/// How positions are held in a window, where the picture's width allows for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// The picture's width is 2^this.
+    pub width_log2: u32,
+    /// The window has 2^this rows.
+    pub rows_log2: u32,
+}
+
+impl Window {
+    /// The window for pictures 2^`width_log2` texels wide and `height` high: the fraction bits are shared out so that a texel
+    /// has at least 256 steps.
+    const fn new(width_log2: u32, height: u32) -> Option<Self> {
+        let rows_log2 = if width_log2 == 10 { 4 } else { 5 };
+        let known = matches!(width_log2, 8..=10);
+        if known && height >= 1 << rows_log2 { Some(Self { width_log2, rows_log2 }) } else { None }
+    }
+
+    /// How far u is shifted up from Q16 texels.
+    const fn shift_u(self) -> u32 {
+        16u32.wrapping_sub(self.width_log2)
+    }
+
+    /// How far v is shifted up from Q16 texels.
+    const fn shift_v(self) -> u32 {
+        15u32.wrapping_sub(self.rows_log2)
+    }
+
+    /// The edge between `above` and `below`, 2^`log2` rows apart, in a window from `row` on.
+    #[inline(always)]
+    const fn edge(self, above: PlayUv, below: PlayUv, row: u32, log2: u32) -> Edge {
+        let (shift_u, shift_v) = (self.shift_u(), self.shift_v());
+        let [half_u, half_v] = halves(self.width_log2, self.rows_log2);
+        // Both shifts are at least 5: the steps lose nothing.
+        Edge {
+            u: (above.u as u32).wrapping_shl(shift_u).wrapping_add(half_u),
+            v: (above.v as u32).wrapping_sub(row.wrapping_shl(16)).wrapping_shl(shift_v).wrapping_add(half_v),
+            down_u: (below.u.wrapping_sub(above.u) as u32).wrapping_shl(shift_u.wrapping_sub(log2)),
+            down_v: (below.v.wrapping_sub(above.v) as u32).wrapping_shl(shift_v.wrapping_sub(log2)),
+        }
+    }
+}
+
+/// Half a step of u and of v, as edges count them: an edge's position has it added, so that cutting bits off rounds to nearest.
+#[must_use]
+pub const fn halves(width_log2: u32, rows_log2: u32) -> [u32; 2] {
+    let bits = width_log2.wrapping_add(rows_log2);
+    [1u32.wrapping_shl(bits.wrapping_sub(1)), 1u32.wrapping_shl(30u32.wrapping_sub(bits))]
+}
+
+/// Positions in runs keep this far from the edges of picture and window, Q16 texels: more than rounding moves them.
+const MARGIN: i32 = 1 << 10;
+
+/// A strip's blocks, in caller's memory.
+#[derive(Debug)]
+pub struct Plan<'m> {
+    /// The runs' edges, from left to right.
+    pub edge: &'m mut [Edge],
+    /// The runs.
+    pub run: &'m mut [Run],
+    /// The other blocks.
+    pub mixed: &'m mut [Mixed],
+    /// How many of each there are.
+    pub edges: usize,
+    /// Runs.
+    pub runs: usize,
+    /// Mixed blocks.
+    pub mixes: usize,
+    /// Where the last edge's ends are across, Q16 texels: above, below.
+    pub last: [i32; 2],
+    /// The strip it is about; none: nothing yet.
+    pub strip: Option<u32>,
+    /// The row of the strip at which the edges stand.
+    pub row: u32,
+    /// Pixels of a row in cells of one sheet.
+    pub smooth: u32,
+    /// Pixels of a row in cells of more.
+    pub torn: u32,
+    /// Coverage tests of a row.
+    pub tests: u32,
+}
+
+/// What a plan is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Site<'s, 'a, 'm> {
+    /// Labels, screen, source image.
+    pub bundle: &'s Bundle<'a>,
+    /// The rows of nodes around the row of cells.
+    pub rows: Rows<'s, 'm>,
+    /// Its sheets.
+    pub sheets: &'s RowSheets<'m>,
+}
+
+impl Site<'_, '_, '_> {
+    /// A block is 2^this pixels wide and high.
+    #[must_use]
+    pub fn log2(&self) -> u32 {
+        let cell = self.bundle.grid().log2;
+        if self.cubic() { cell.wrapping_sub(1) } else { cell }
+    }
+
+    /// Block `block` of strip `strip`, where space is cubic.
+    #[must_use]
+    #[inline(always)]
+    pub const fn quarter(&self, block: u32, strip: u32) -> Block<'_, '_> {
+        Block { rows: self.rows, quarter: Some([block & 1 == 1, strip & 1 == 1]) }
+    }
+
+    /// What is above and below strip `strip` where space is cubic.
+    fn lines(&self, strip: u32) -> [Line<'_>; 2] {
+        let [top, halfway, bottom] = self.rows;
+        let first = (strip & 1) as usize;
+        let (upper, lower) = if first == 0 { (top, halfway) } else { (halfway, bottom) };
+        [
+            Line { layer: upper.layer, middle: upper.middle, place: first },
+            Line { layer: lower.layer, middle: lower.middle, place: first.wrapping_add(1) },
+        ]
+    }
+
+    fn cubic(&self) -> bool {
+        self.bundle.path().space == SPACE_CUBIC
+    }
+
+    /// Block `block` of strip `strip`.
+    #[must_use]
+    pub fn block(&self, block: u32, strip: u32) -> Block<'_, '_> {
+        let quarter = self.cubic().then_some([block & 1 == 1, strip & 1 == 1]);
+        Block { rows: self.rows, quarter }
+    }
+}
+
+/// A row of nodes as cubic space has it along a strip's upper or lower side: where nodes are, and halfway to the next.
+#[derive(Clone, Copy, Debug)]
+struct Line<'l> {
+    layer: &'l [Layer],
+    middle: &'l [Layer],
+    /// Which of a sheet's three rows this is.
+    place: usize,
+}
+
+impl Line<'_> {
+    /// A sheet's positions in the middle and at the right side of its cell.
+    #[inline(always)]
+    fn points(&self, sheet: &Sheet) -> Option<[PlayUv; 2]> {
+        let [left, right] = sheet.nodes(self.place)?;
+        Some([self.middle.get(usize::from(left))?.uv(), self.layer.get(usize::from(right))?.uv()])
+    }
+}
+
+impl Plan<'_> {
+    /// Plans strip `strip` of the screen.
+    #[inline(never)]
+    pub fn make(&mut self, site: &Site<'_, '_, '_>, strip: u32) {
+        (self.edges, self.runs, self.mixes) = (0, 0, 0);
+        (self.smooth, self.torn, self.tests) = (0, 0, 0);
+        (self.strip, self.row) = (Some(strip), 0);
+        let texture = site.bundle.texture();
+        let window = Window::new(texture.width_log2, texture.height);
+        let (log2, width) = (site.log2(), site.bundle.size().0);
+        let blocks = if site.cubic() { 2u32 } else { 1 };
+        let mut left = 0u32;
+        let mut block = 0u32;
+        let mut column = 0usize;
+        let lines = site.lines(strip);
+        while left < width {
+            let (first, sheets) = site.sheets.cell(column);
+            if let ([_], Some(window)) = (sheets, window)
+                && blocks == 2
+            {
+                // Most of most pictures.
+                let most = (width.saturating_sub(left) >> log2 >> 1) as usize;
+                // In pictures 512 wide, as most are; others go by `append` alone.
+                let cells = if window.width_log2 == 9 { self.extend::<9, 5>(column, most, site.sheets, lines, log2) } else { 0 };
+                if cells > 0 {
+                    let pixels = (cells as u32).wrapping_shl(log2).wrapping_mul(2);
+                    self.smooth = self.smooth.wrapping_add(pixels);
+                    (left, block) = (left.wrapping_add(pixels), block.wrapping_add(cells as u32).wrapping_add(cells as u32));
+                    column = column.wrapping_add(cells);
+                    continue;
+                }
+            }
+            for _ in 0..blocks {
+                let pixels = width.saturating_sub(left).min(1 << log2);
+                let place = site.block(block, strip);
+                let shown = match sheets {
+                    [_] => 1,
+                    _ => candidates(site, &place, sheets),
+                };
+                let single = sheets.get(shown.trailing_zeros() as usize).filter(|_| shown.is_power_of_two());
+                let run = match (single, window) {
+                    (Some(sheet), Some(window)) => self.append(block as u16, sheet, place.corners(sheet), window, texture.height, log2),
+                    _ => false,
+                };
+                if !run {
+                    self.mix(Mixed { block: block as u16, sheet: first as u16, sheets: shown });
+                    self.tests = self.tests.wrapping_add(pixels.wrapping_mul(shown.count_ones().saturating_sub(1)));
+                }
+                let kind = if sheets.len() < 2 { &mut self.smooth } else { &mut self.torn };
+                *kind = kind.wrapping_add(pixels);
+                left = left.wrapping_add(pixels);
+                block = block.wrapping_add(1);
+            }
+            column = column.wrapping_add(1);
+        }
+    }
+
+    /// Appends smooth cells from `column` on to the last run, both blocks of each, as long as they follow it and fit into its window,
+    /// `most` at most; returns how many. WIDTH and ROWS are the window's.
+    #[inline(never)]
+    fn extend<const WIDTH: u32, const ROWS: u32>(
+        &mut self,
+        column: usize,
+        most: usize,
+        sheets: &RowSheets<'_>,
+        [above, below]: [Line<'_>; 2],
+        log2: u32,
+    ) -> usize {
+        let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return 0 };
+        let block = column.wrapping_mul(2);
+        if usize::from(run.block).wrapping_add(usize::from(run.blocks)) != block {
+            return 0;
+        }
+        let Some((&first, starts)) = sheets.start.get(column..).and_then(<[u16]>::split_first) else { return 0 };
+        let Some(listed) = sheets.sheet.get(usize::from(first)..) else { return 0 };
+        let Some(edges) = self.edge.get_mut(self.edges..) else { return 0 };
+        let label = run.label as u8;
+        let window = Window { width_log2: WIDTH, rows_log2: ROWS };
+        let row = u32::from(run.row);
+        let least = (row as i32).wrapping_shl(16).wrapping_add(MARGIN);
+        let [across, down] = [WIDTH, ROWS].map(|log2| 1u32.wrapping_shl(log2.wrapping_add(16)));
+        let inside = |uv: PlayUv| (uv.u.wrapping_sub(MARGIN) as u32) < across.wrapping_sub((2 * MARGIN) as u32);
+        let within = |uv: PlayUv| (uv.v.wrapping_sub(least) as u32) < down.wrapping_sub((2 * MARGIN) as u32);
+        let [mut from, mut to] = self.last;
+        let mut next = first;
+        let mut done = 0usize;
+        for ((sheet, &start), [middle, right]) in listed.iter().zip(starts).zip(edges.as_chunks_mut::<2>().0).take(most) {
+            next = next.wrapping_add(1);
+            if start != next || sheet.label() != label {
+                break;
+            }
+            let (Some([a, b]), Some([c, d])) = (above.points(sheet), below.points(sheet)) else { break };
+            if !(inside(a) && inside(b) && inside(c) && inside(d) && within(a) && within(b) && within(c) && within(d)) {
+                break;
+            }
+            // As in `append`: steps across of less than half the width, which is a power of two.
+            let step = |from: i32, to: i32| to.wrapping_sub(from).wrapping_add((across >> 1) as i32) as u32;
+            if step(from, a.u) | step(a.u, b.u) | step(to, c.u) | step(c.u, d.u) >= across {
+                break;
+            }
+            *middle = window.edge(a, c, row, log2);
+            *right = window.edge(b, d, row, log2);
+            (from, to) = (b.u, d.u);
+            done = done.wrapping_add(1);
+        }
+        let blocks = done.wrapping_mul(2);
+        run.blocks = run.blocks.wrapping_add(blocks as u16);
+        self.edges = self.edges.wrapping_add(blocks);
+        self.last = [from, to];
+        done
+    }
+
+    fn mix(&mut self, mixed: Mixed) {
+        if let Some(slot) = self.mixed.get_mut(self.mixes) {
+            *slot = mixed;
+            self.mixes = self.mixes.wrapping_add(1);
+        }
+    }
+
+    /// Appends a block that shows one sheet to the last run, or begins another; false where its positions fit no window.
+    #[inline(never)]
+    fn append(&mut self, block: u16, sheet: &Sheet, corners: Corners, window: Window, height: u32, log2: u32) -> bool {
+        let [a, b, c, d] = corners;
+        let width = 1i32.wrapping_shl(window.width_log2.wrapping_add(16));
+        let inside = |x: i32, limit: i32| (x.wrapping_sub(MARGIN) as u32) < limit.wrapping_sub(2 * MARGIN) as u32;
+        // Steps across are told from differences of less than half the width.
+        let near = |from: i32, to: i32| (to.wrapping_sub(from).wrapping_add(width >> 1) as u32) < width as u32;
+        if !(inside(b.u, width) && inside(d.u, width) && near(a.u, b.u) && near(c.u, d.u)) {
+            return false;
+        }
+        let rows = 1i32.wrapping_shl(window.rows_log2.wrapping_add(16));
+        let label = u16::from(sheet.label());
+        let within = |row: u16, uv: PlayUv| inside(uv.v.wrapping_sub(i32::from(row).wrapping_shl(16)), rows);
+        let last = self.runs.wrapping_sub(1);
+        if let (Some(run), Some(slot)) = (self.run.get_mut(last), self.edge.get_mut(self.edges))
+            && run.label == label
+            && run.block.wrapping_add(run.blocks) == block
+            && within(run.row, b)
+            && within(run.row, d)
+        {
+            *slot = window.edge(b, d, run.row.into(), log2);
+            run.blocks = run.blocks.wrapping_add(1);
+            self.edges = self.edges.wrapping_add(1);
+            self.last = [b.u, d.u];
+            return true;
+        }
+        if !(inside(a.u, width) && inside(c.u, width)) {
+            return false;
+        }
+        // The window begins or ends at the block, so that it has room where the run is heading.
+        let (low, high) = (a.v.min(b.v).min(c.v.min(d.v)), a.v.max(b.v).max(c.v.max(d.v)));
+        let onwards = b.v.wrapping_add(d.v) >= a.v.wrapping_add(c.v);
+        let row = if onwards {
+            low.wrapping_sub(MARGIN) >> 16
+        } else {
+            (high.wrapping_add(MARGIN) >> 16).wrapping_add(1).wrapping_sub(1i32.wrapping_shl(window.rows_log2))
+        };
+        let row = row.min(height.wrapping_sub(1u32.wrapping_shl(window.rows_log2)) as i32).max(0) as u16;
+        if ![a, b, c, d].into_iter().all(|uv| within(row, uv)) {
+            return false;
+        }
+        let after = self.edges.wrapping_add(2);
+        let (Some(slot), Some([left, right])) = (self.run.get_mut(self.runs), self.edge.get_mut(self.edges..after)) else { return false };
+        *left = window.edge(a, c, row.into(), log2);
+        *right = window.edge(b, d, row.into(), log2);
+        *slot = Run { block, blocks: 1, edge: self.edges as u16, row, label };
+        (self.edges, self.runs) = (after, self.runs.wrapping_add(1));
+        self.last = [b.u, d.u];
+        true
+    }
+
+    /// Steps the edges down to row `row` of the strip, which none of them is past.
+    pub fn skip_to(&mut self, row: u32) {
+        for _ in self.row..row {
+            for edge in self.edge.get_mut(..self.edges).unwrap_or(&mut []) {
+                edge.advance();
+            }
+        }
+        self.row = row;
+    }
+}
+
+/// Which of a torn cell's `sheets` the block can show, a bit each: those that cover part of it, in front of the first that
+/// covers all of it.
+#[inline(never)]
+fn candidates(site: &Site<'_, '_, '_>, block: &Block<'_, '_>, sheets: &[Sheet]) -> u16 {
+    let mut shown = 0u16;
+    let last = sheets.len().wrapping_sub(1);
+    for (place, sheet) in sheets.iter().enumerate().take(MAX_SHEETS) {
+        let bit = 1u16.wrapping_shl(place as u32);
+        if place == last {
+            return shown | bit;
+        }
+        let record = site.bundle.label(sheet.label());
+        let mut cover = Cover::All;
+        if sheet.test() != CHART {
+            cover = field_cover(block.field(sheet, 0), block.quarter);
+            if record.flags & STRIP != 0 {
+                cover = cover.and(field_cover(block.field(sheet, 1), block.quarter));
+            }
+        }
+        if sheet.test() != FIELD && cover != Cover::Nothing {
+            cover = cover.and(Chart::new(&record).cover(&block.corners(sheet)));
+        }
+        match cover {
+            Cover::Nothing => {}
+            Cover::Part => shown |= bit,
+            Cover::All => return shown | bit,
+        }
+    }
+    shown
+}
+
+/// How much of a block a field of `corners` at the cell's corners covers.
+fn field_cover(corners: [i32; 4], quarter: Option<[bool; 2]>) -> Cover {
+    let [mut a, mut b, mut c, mut d] = corners;
+    if let Some([right, lower]) = quarter {
+        let middle = |x: i32, y: i32| x.wrapping_add(y) >> 1;
+        if lower {
+            (a, b) = (middle(a, c), middle(b, d));
+        } else {
+            (c, d) = (middle(a, c), middle(b, d));
+        }
+        if right {
+            (a, c) = (middle(a, b), middle(c, d));
+        } else {
+            (b, d) = (middle(a, b), middle(c, d));
+        }
+    }
+    // Rounding moves a field by less than this, Q16 pixels.
+    const SLACK: i32 = 64;
+    let (low, high) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
+    if low > SLACK {
+        Cover::All
+    } else if high < -SLACK {
+        Cover::Nothing
+    } else {
+        Cover::Part
+    }
+}

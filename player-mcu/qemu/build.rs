@@ -1,0 +1,22 @@
+//! Hands `memory.x` to the linker, by way of cortex-m-rt's `link.x`, and the bundle that CUBIST_BUNDLE names to the compiler:
+//! it is linked in, as it would lie in flash.
+
+use std::path::PathBuf;
+
+fn main() -> std::io::Result<()> {
+    let out = PathBuf::from(std::env::var_os("OUT_DIR").unwrap_or_default());
+    std::fs::copy("memory.x", out.join("memory.x"))?;
+    println!("cargo:rustc-link-search={}", out.display());
+    println!("cargo:rustc-link-arg-bins=-Tlink.x");
+    println!("cargo:rerun-if-changed=memory.x");
+    println!("cargo:rerun-if-env-changed=CUBIST_BUNDLE");
+    // Without a bundle the firmware builds all the same, and says what is wrong when it runs.
+    let bundle = match std::env::var_os("CUBIST_BUNDLE") {
+        Some(path) => {
+            println!("cargo:rerun-if-changed={}", PathBuf::from(&path).display());
+            std::fs::read(path)?
+        }
+        None => Vec::new(),
+    };
+    std::fs::write(out.join("bundle.cubist"), bundle)
+}
