@@ -58,6 +58,17 @@ pub enum BakeError {
         /// The best that a search found, dB.
         nearest: f64,
     },
+    /// No bundle that a search found plays in the memory there is.
+    #[error(
+        "--ram: expected room for {smallest} bytes, the least that a player of this scene was found to need, found {asked}; raise it, lower \
+         --size, or leave --time, --space, --cell and --key-interval to the search"
+    )]
+    Ram {
+        /// Bytes allowed.
+        asked: usize,
+        /// Bytes of working memory of the least demanding bundle found.
+        smallest: usize,
+    },
     /// The player refuses what was baked: a fault of the baker.
     #[error(transparent)]
     Verify(#[from] VerifyError),

@@ -1,9 +1,10 @@
 //! The command line: what may be typed, and what it means.
 //! Arguments come in; checked options go to `main`.
 
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use cubist_baker::atlas;
 use cubist_baker::{Goal, Options, TruthFrames};
+use cubist_core::format::{SPACE_CUBIC, SPACE_LINEAR, TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
 use std::path::PathBuf;
 
 /// Bakes a 3D scene and a camera path into a small bundle that plays on microcontrollers.
@@ -28,6 +29,8 @@ Examples:
                                          at most 64 x 1024 bytes, at the best quality that fits
   cubist-bake fox.glb -o fox.cubist --psnr 32
                                          the smallest bundle of that quality
+  cubist-bake fox.glb -o fox.cubist --ram 48K
+                                         for a player with 48 x 1024 bytes of working memory
   cubist-bake inspect fox.cubist         what a bundle holds, byte by section
 
 If something looks wrong, --diagnostics DIR shows the source image, and exact frames next to played ones.
@@ -60,8 +63,25 @@ pub struct Bake {
     #[arg(long, value_name = "PX", value_parser = cell)]
     pub cell: Option<u32>,
     /// Frames between keys, 1 to 256 [default: 8].
+    ///
+    /// That is the mean: keys stand closer where the view turns quickly, and at a path's ends, unless --even-keys says otherwise.
     #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(1..=256))]
     pub key_interval: Option<u32>,
+    /// Keys stand every --key-interval frames, whether or not they are needed there.
+    ///
+    /// Every key then takes the same time to come in; quality is a little lower.
+    #[arg(long)]
+    pub even_keys: bool,
+    /// How surfaces move between keys [default: cubic].
+    ///
+    /// The player holds two keys more for cubic, which is about a third of its memory; linear and hold take the same.
+    #[arg(long, value_enum, value_name = "KIND")]
+    pub time: Option<Time>,
+    /// How surfaces bend between the corners of cells [default: cubic].
+    ///
+    /// Cubic halves every cell along curves through the corners around it. Linear draws faster, and needs two rows of corners instead of five.
+    #[arg(long, value_enum, value_name = "KIND")]
+    pub space: Option<Space>,
     /// Largest side of the source image, texels, 64 to 1024.
     #[arg(long, value_name = "MAX_SIDE", default_value_t = atlas::Settings::default().max_side, value_parser = clap::value_parser!(u32).range(64..=1024))]
     pub atlas: u32,
@@ -77,14 +97,20 @@ pub struct Bake {
     /// The whole bundle takes at most this many bytes (also 256K, 2M), at the best quality that does.
     ///
     /// Quality is measured against the antialiased scene; cells, keys and the source image are searched.
-    #[arg(long, value_name = "BYTES", value_parser = budget, conflicts_with = "psnr")]
+    #[arg(long, value_name = "BYTES", value_parser = budget, conflicts_with_all = ["psnr", "ram"])]
     pub budget: Option<u64>,
     /// The smallest bundle whose mean PSNR against exact rays through its source image reaches this many dB.
     ///
     /// Cells and keys are searched; the source image stays as --atlas and --density ask, and gets coarser only where nothing
     /// else reaches the goal.
-    #[arg(long, value_name = "DB", value_parser = psnr)]
+    #[arg(long, value_name = "DB", value_parser = psnr, conflicts_with = "ram")]
     pub psnr: Option<f64>,
+    /// Playing takes at most this many bytes of working memory (also 48K), at the best quality that does.
+    ///
+    /// Where the bundle needs more, linear --time, linear --space and larger cells are tried, each unless it is given (cells only grow), and as a
+    /// last resort a shorter --key-interval; what was given up is said at the end. A row of pixels comes on top: two bytes each.
+    #[arg(long, value_name = "BYTES", value_parser = budget)]
+    pub ram: Option<u64>,
     /// Writes bytes, seconds, quality and warnings as JSON.
     #[arg(long, value_name = "FILE.json")]
     pub report: Option<PathBuf>,
@@ -100,6 +126,26 @@ pub struct Bake {
     /// No progress, no table, no warnings: errors only.
     #[arg(long)]
     pub quiet: bool,
+}
+
+/// How surfaces move between keys.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Time {
+    /// Not at all: the picture jumps from key to key.
+    Hold,
+    /// Straight from key to key.
+    Linear,
+    /// On a curve through four keys.
+    Cubic,
+}
+
+/// How surfaces bend between the corners of cells.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Space {
+    /// Not at all: straight from corner to corner.
+    Linear,
+    /// On a curve through four corners.
+    Cubic,
 }
 
 /// What replaces the scene's playback.
@@ -149,14 +195,24 @@ impl Bake {
     /// The baker's options.
     #[must_use]
     pub fn options(&self, load_seconds: f64) -> Options {
-        let goal = match (self.budget, self.psnr) {
-            (Some(budget), _) => Goal::Budget(budget),
-            (None, Some(psnr)) => Goal::Psnr(psnr),
-            (None, None) => Goal::AsSet,
+        let goal = match (self.budget, self.psnr, self.ram) {
+            (Some(budget), ..) => Goal::Budget(budget),
+            (None, Some(psnr), _) => Goal::Psnr(psnr),
+            (None, None, Some(ram)) => Goal::Ram(usize::try_from(ram).unwrap_or(usize::MAX)),
+            (None, None, None) => Goal::AsSet,
         };
+        let time = |time| match time {
+            Time::Hold => TIME_HOLD,
+            Time::Linear => TIME_LINEAR,
+            Time::Cubic => TIME_CUBIC,
+        };
+        let space = |space| if space == Space::Linear { SPACE_LINEAR } else { SPACE_CUBIC };
         Options {
             cell: self.cell,
             key_interval: self.key_interval,
+            time: self.time.map(time),
+            space: self.space.map(space),
+            even_keys: self.even_keys,
             source: atlas::Settings { max_side: self.atlas, density: self.density, colours: self.colours.into() },
             independent_every: self.independent_every.into(),
             goal,
@@ -270,10 +326,18 @@ mod tests {
         let cli = Cli::try_parse_from(["cubist-bake", "a.toml", "-o", "a.cubist", "--budget", "64K", "--truth", "all"]).unwrap();
         let options = cli.bake.options(0.5);
         assert_eq!((options.goal, options.truth, options.load_seconds), (Goal::Budget(65_536), TruthFrames::All, 0.5));
+        let wanted = ["cubist-bake", "a.glb", "-o", "a.cubist", "--ram", "16K", "--time", "linear", "--space", "cubic", "--even-keys"];
+        let options = Cli::try_parse_from(wanted).unwrap().bake.options(0.0);
+        assert_eq!((options.goal, options.even_keys), (Goal::Ram(16_384), true));
+        assert_eq!((options.time, options.space), (Some(TIME_LINEAR), Some(SPACE_CUBIC)));
         assert!(Cli::try_parse_from(["cubist-bake", "inspect", "a.cubist", "--json"]).unwrap().command.is_some());
         for wrong in [
             &["cubist-bake", "a.toml"][..],
             &["cubist-bake", "a.toml", "-o", "b", "--budget", "1K", "--psnr", "30"],
+            &["cubist-bake", "a.toml", "-o", "b", "--budget", "1K", "--ram", "30K"],
+            &["cubist-bake", "a.toml", "-o", "b", "--ram", "30K", "--psnr", "30"],
+            &["cubist-bake", "a.toml", "-o", "b", "--time", "square"],
+            &["cubist-bake", "a.toml", "-o", "b", "--space", "hold"],
             &["cubist-bake", "a.toml", "-o", "b", "--cell", "7"],
             &["cubist-bake", "a.toml", "-o", "b", "--psnr", "nan"],
             &["cubist-bake", "a.toml", "-o", "b", "--atlas", "32"],

@@ -23,6 +23,8 @@ pub enum Goal {
     Budget(u64),
     /// The fewest bytes with at least this mean PSNR, dB, against exact ray casting.
     Psnr(f64),
+    /// At most this many bytes of working memory for playing, at the best quality that fits.
+    Ram(usize),
 }
 
 /// The frames to compare with the antialiased scene.
@@ -43,6 +45,12 @@ pub struct Options {
     pub cell: Option<u32>,
     /// Frames between keys; `None`: the baker chooses.
     pub key_interval: Option<u32>,
+    /// How layers are interpolated between keys: one of the format's `TIME_` numbers; `None`: the baker chooses.
+    pub time: Option<u8>,
+    /// How they are interpolated between nodes: one of the format's `SPACE_` numbers; `None`: the baker chooses.
+    pub space: Option<u8>,
+    /// Keys stand at even intervals, not where they are needed most.
+    pub even_keys: bool,
     /// The source image; a search may make it coarser.
     pub source: atlas::Settings,
     /// Every this many keys one that needs no earlier one.
@@ -60,6 +68,9 @@ impl Default for Options {
         Self {
             cell: None,
             key_interval: None,
+            time: None,
+            space: None,
+            even_keys: false,
             source: atlas::Settings::default(),
             independent_every: Settings::default().coding.independent_every,
             goal: Goal::AsSet,
@@ -77,6 +88,9 @@ impl Options {
         settings.coding.independent_every = self.independent_every;
         settings.cell = self.cell.unwrap_or(if width > WIDE { 16 } else { settings.cell });
         settings.key_interval = self.key_interval.unwrap_or(settings.key_interval);
+        settings.time = self.time.unwrap_or(settings.time);
+        settings.space = self.space.unwrap_or(settings.space);
+        settings.adapt_keys = !self.even_keys;
         settings
     }
 }

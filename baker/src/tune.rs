@@ -1,4 +1,4 @@
-//! Tuning: the bundle that fits a budget at the best quality, or that reaches a quality at the fewest bytes.
+//! Tuning: the bundle that fits a budget at the best quality, or that reaches a quality at the fewest bytes; `ram` has memory's.
 //! A scene and a goal come from `job`; the winner goes back there. Rays are cast once; whatever is tried is baked, played
 //! and measured. What is tried, and in which order, depends on nothing but the scene and the options.
 
@@ -38,7 +38,7 @@ const SLACK: f64 = 1.05;
 /// Searches for `goal`.
 ///
 /// # Errors
-/// [`BakeError::Budget`] or [`BakeError::Psnr`] where nothing reaches the goal, with the nearest that can be; whatever
+/// [`BakeError::Budget`], [`BakeError::Psnr`] or [`BakeError::Ram`] where nothing reaches the goal, with the nearest that can be; whatever
 /// flattening and encoding say.
 pub(crate) fn search(scene: &Scene, options: &Options, goal: Goal, progress: Progress<'_>) -> Result<Chosen, BakeError> {
     let start = Instant::now();
@@ -49,6 +49,7 @@ pub(crate) fn search(scene: &Scene, options: &Options, goal: Goal, progress: Pro
     let mut chosen = match goal {
         Goal::Budget(budget) => search.budget(budget)?,
         Goal::Psnr(asked) => search.psnr(asked)?,
+        Goal::Ram(room) => search.ram(room)?,
         Goal::AsSet => {
             let settings = options.settings(scene.playback.width);
             let flat = search.flat(settings.atlas)?;
@@ -60,9 +61,10 @@ pub(crate) fn search(scene: &Scene, options: &Options, goal: Goal, progress: Pro
     Ok(chosen)
 }
 
-struct Search<'a> {
-    scene: &'a Scene,
-    options: &'a Options,
+/// A scene whose rays are cast, and what is asked of its bundle.
+pub(crate) struct Search<'a> {
+    pub(crate) scene: &'a Scene,
+    pub(crate) options: &'a Options,
     tracer: Tracer<'a>,
     hits: Hits,
     ray_seconds: f64,
@@ -87,7 +89,8 @@ struct Keys {
 }
 
 impl Search<'_> {
-    fn flat(&self, source: atlas::Settings) -> Result<Flat, BakeError> {
+    /// The source image that `source` asks for, and what goes with it.
+    pub(crate) fn flat(&self, source: atlas::Settings) -> Result<Flat, BakeError> {
         let start = Instant::now();
         let atlas = atlas::build(self.scene, &self.hits, &source, &|_, _| {})?;
         let flat = Flat {
@@ -102,7 +105,8 @@ impl Search<'_> {
         Ok(flat)
     }
 
-    fn encode(&self, flat: &Flat, settings: &Settings) -> Result<Encoded, BakeError> {
+    /// Fits and codes keys, in silence.
+    pub(crate) fn encode(&self, flat: &Flat, settings: &Settings) -> Result<Encoded, BakeError> {
         bake::encode(self.scene, flat, settings, &|_, _| {})
     }
 
@@ -125,7 +129,8 @@ impl Search<'_> {
         cells.iter().flat_map(|&cell| each(cell)).collect()
     }
 
-    fn say(&self, done: usize, of: usize) {
+    /// Tells how much of the search is done.
+    pub(crate) fn say(&self, done: usize, of: usize) {
         (self.progress)("searching", done as f64 / of.max(1) as f64);
     }
 
@@ -308,7 +313,7 @@ impl Search<'_> {
 
 /// What came of an attempt; `None` where a bundle cannot hold it: that ends the attempt, not the search. The first to exceed
 /// a bound is remembered.
-fn possible<T>(attempt: Result<T, BakeError>, exceeded: &mut Option<BakeError>) -> Result<Option<T>, BakeError> {
+pub(crate) fn possible<T>(attempt: Result<T, BakeError>, exceeded: &mut Option<BakeError>) -> Result<Option<T>, BakeError> {
     match attempt {
         Err(error @ BakeError::Limit(_)) => {
             exceeded.get_or_insert(error);

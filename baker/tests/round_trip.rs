@@ -6,7 +6,7 @@ use cubist_baker::encode::{self, CodingSettings, Content, Exceeded, Header};
 use cubist_baker::gbuffer::GBuffer;
 use cubist_baker::sheets::{self, KeyGrid, Layers};
 use cubist_baker::{fields, fit, order};
-use cubist_core::format::{TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
+use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
 use cubist_core::{Bundle, Frame, Player};
 
 const SIZE: [u32; 2] = [100, 60];
@@ -50,7 +50,7 @@ fn bake_every(interval: u32, gbuffer: &GBuffer, image: &SourceImage, looping: bo
     let grid = KeyGrid::new(gbuffer, 3, interval, looping, [time, SPACE_CUBIC]);
     let mut sheets = sheets::find(gbuffer, &grid, 1);
     let layers = Layers::of(&grid, &sheets);
-    let fit = fit::solve(gbuffer, &grid, &sheets, &layers);
+    let fit = fit::solve(gbuffer, &grid, &sheets, &layers, &vec![None; layers.label.len()]);
     let (field_price, coverage) = (4, Coverage::All);
     let mut evidence = order::Evidence { gbuffer, grid: &grid, image, layers: &layers, fit: &fit, fields: None, field_price, coverage };
     order::sort(&evidence, &mut sheets);
@@ -142,7 +142,7 @@ fn more_layers_than_a_key_can_have_are_an_error_with_a_cure() {
     let pixels = 1024 * 1024;
     let gbuffer = GBuffer { width: 1024, height: 1024, frames: 1, label: vec![1; pixels], uv: vec![[0.5f32; 2]; pixels].into() };
     let (_, image) = self::gbuffer(false);
-    let grid = KeyGrid::new(&gbuffer, 2, 1, false, TIME_LINEAR);
+    let grid = KeyGrid::new(&gbuffer, 2, 1, false, [TIME_LINEAR, SPACE_CUBIC]);
     let sheets = sheets::find(&gbuffer, &grid, 1);
     let layers = Layers::of(&grid, &sheets);
     let count = layers.label.len();

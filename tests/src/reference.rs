@@ -201,7 +201,7 @@ impl<'a> Reference<'a> {
     pub fn candidates(&self, frame: u32, weights: Weights) -> Vec<Vec<(u8, [f64; 2])>> {
         let mut all = Vec::new();
         self.each_pixel(frame, weights, |sheets, within| {
-            all.push(sheets.iter().map(|sheet| (sheet.label, bilinear(&sheet.corners, within))).collect());
+            all.push(sheets.iter().map(|sheet| (sheet.label, quartered(&sheet.points, within))).collect());
         });
         all
     }

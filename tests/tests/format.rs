@@ -9,7 +9,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 /// What made the bundle.
-const COMMAND: &str = "cubist-bake builtin:cone-orbit --size 48x32 --frames 5 --key-interval 4 --cell 16 --atlas 64 --colours 16 --truth none \
+const COMMAND: &str = "cubist-bake builtin:cone-orbit --size 48x32 --frames 5 --key-interval 4 --cell 4 --atlas 64 --colours 16 --truth none \
                        -o fixtures/format/cone.cubist";
 const MARK: &str = "<!-- dump -->\n";
 
@@ -94,6 +94,12 @@ impl Dump<'_> {
         self.bytes[at..at + count].iter().rev().fold(0, |value, &byte| value << 8 | usize::from(byte))
     }
 
+    /// Three numbers of 32 bits with a sign.
+    fn vector(&mut self, name: &str) {
+        let [x, y, z] = [0, 4, 8].map(|offset| self.little_endian(self.at + offset, 4) as u32 as i32);
+        self.take(12, &format!("{name}({x}, {y}, {z})"));
+    }
+
     fn bundle(&mut self) {
         self.take(6, "magic: CUBIST");
         self.varint("version ", "");
@@ -122,8 +128,9 @@ impl Dump<'_> {
         }
         self.byte("looping: ");
         self.byte("cell_log2 ");
-        self.byte("time ");
-        self.byte("step_log2 ");
+        for name in ["time ", "space ", "key_bits ", "step_log2 "] {
+            self.byte(name);
+        }
         for name in ["key_layers ", "row_layers ", "list_bytes ", "row_sheets "] {
             self.varint(name, "");
         }
@@ -137,6 +144,20 @@ impl Dump<'_> {
             let independent = if frame >> 31 == 1 { ", independent" } else { "" };
             self.take(8, &format!("key {key}: frame {}{independent}; its record ends at {end}", frame & 0x7fff_ffff));
             ends.push(end);
+        }
+        let planes = self.varint("", " bytes of planes");
+        for _ in 0..planes / 38 {
+            self.byte("plane of label ");
+            self.byte("  shift ");
+            for name in ["origin", "along_u", "along_v"] {
+                self.vector(&format!("  {name} "));
+            }
+        }
+        let cameras = self.varint("", " bytes of cameras");
+        for key in 0..cameras / 48 {
+            for name in ["eye", "first", "column", "row"] {
+                self.vector(&format!("camera of key {key}: {name} "));
+            }
         }
         self.varint("", " bytes of records");
         for (key, ends) in ends.windows(2).enumerate() {

@@ -5,9 +5,11 @@ use cubist_baker::bake::Settings;
 use cubist_core::coder::{Bits, Probability};
 use cubist_core::format::{
     ATLAS, Atlas, Envelope, FIXED, KNOWN_FLAGS, KeyEntry, LABEL_BYTES, LABELS, LabelRecord, Limits, MASKED, PATH, Path, STRIP, Section,
+    VERSION,
 };
 use cubist_core::grid::Grid;
 use cubist_core::lists::{self, BOTH, CHART, FIELD, Lists, Sheets, SheetsRef};
+use cubist_core::plane::{CAMERA_BYTES, Camera, PLANE_BYTES, Plane, Vector};
 use cubist_core::{Bundle, BundleError, Frame, MemoryError, Player, checksum};
 use cubist_tests::scenes;
 use proptest::prelude::*;
@@ -27,6 +29,7 @@ fn sound() -> &'static [u8] {
         assert!(bundle.limits().cell_sheets > 2, "torn cells belong to the test");
         assert!(bundle.limits().fields == 2, "strips belong to the test");
         println!("{} bytes, {:?}, {} labels, {} keys", bytes.len(), bundle.limits(), bundle.label_count(), bundle.key_count());
+        assert!(!bundle.planes().is_empty(), "planes belong to the test");
         assert!((0..bundle.key_count()).any(|key| !bundle.key(key).independent), "dependent keys belong to the test");
         bytes
     })
@@ -197,7 +200,8 @@ proptest! {
     #[test]
     fn any_limits_and_sizes_play_or_are_refused(
         size in (0u16..80, 0u16..80),
-        grid in (1u8..7, 0u8..3, 0u8..6),
+        grid in (1u8..7, 0u8..4, 0u8..6),
+        units in (0u8..3, 4u8..9),
         limits in (any::<[u16; 5]>(), 0u8..14, 0u8..4, 0u32..5),
         frames in (0u32..20, any::<bool>()),
     ) {
@@ -206,6 +210,7 @@ proptest! {
             let [key_layers, row_layers, list_bytes, row_sheets, seek_keys] = values.map(|x| x >> (3 * shift));
             (path.width, path.height) = size;
             (path.cell_log2, path.time, path.step_log2) = grid;
+            (path.space, path.key_bits) = units;
             (path.frames, path.looping) = frames;
             path.limits = Limits { key_layers, row_layers, list_bytes, row_sheets, cell_sheets, fields, seek_keys };
         }));
@@ -216,9 +221,11 @@ proptest! {
         let third = records.len() as u32 / 3;
         let key = |frame, independent, end| KeyEntry { frame, independent, end }.to_bytes();
         let table = [key(0, true, third), key(3, false, 2 * third), key(8, true, records.len() as u32)].concat();
+        let cameras = vec![0x35; 3 * CAMERA_BYTES];
         let bytes = with_path(|path| {
             (path.looping, path.frames) = (looping, if looping { 11 } else { 9 });
             (path.table, path.records) = (&table, &records);
+            path.cameras = if path.planes.is_empty() { &[] } else { &cameras };
         });
         prop_assert!(survives(&bytes));
     }
@@ -235,6 +242,75 @@ proptest! {
         }).collect();
         survives(&with_section(sound(), LABELS, &labels));
     }
+}
+
+/// Bundles whose planes and cameras hold `vectors`, one after the other.
+fn with_vectors(vectors: &mut dyn FnMut() -> Vector, shifts: &mut dyn FnMut() -> u8) -> Vec<u8> {
+    let (labels, keys) = Bundle::parse(sound()).map(|bundle| (bundle.label_count(), bundle.key_count())).expect("sound");
+    let plane = |label: usize| {
+        let [origin, along_u, along_v] = [vectors(), vectors(), vectors()];
+        Plane { label: label as u8, shift: shifts(), origin, along_u, along_v }.to_bytes()
+    };
+    let planes = (1..labels).map(plane).collect::<Vec<_>>().concat();
+    let camera = |_| {
+        let [eye, first, column, row] = [vectors(), vectors(), vectors(), vectors()];
+        Camera { eye, first, column, row }.to_bytes()
+    };
+    let cameras = (0..keys).map(camera).collect::<Vec<_>>().concat();
+    with_path(|path| (path.planes, path.cameras) = (&planes, &cameras))
+}
+
+/// Numbers at which sums, products and shifts go wrong.
+const EDGES: [i32; 12] =
+    [i32::MIN, i32::MIN + 1, -(1 << 27) - 1, -(1 << 24), -1, 0, 1, 1 << 12, 1 << 24, (1 << 27) + 1, i32::MAX - 1, i32::MAX];
+
+#[test]
+fn planes_and_cameras_of_any_numbers_play() {
+    for x in EDGES {
+        assert!(survives(&with_vectors(&mut || [x; 3], &mut || 0)), "{x} everywhere");
+    }
+    let (mut random, mut shift) = (Random(7), Random(8));
+    for round in 0..400 {
+        // Edges alone; small numbers, whose planes are seen; anything.
+        let mut number = || match round % 3 {
+            0 => EDGES[random.below(EDGES.len())],
+            1 => random.below(2001) as i32 - 1000,
+            _ => random.below(1 << 32) as u32 as i32 >> random.below(28),
+        };
+        let bytes = with_vectors(&mut || [number(), number(), number()], &mut || shift.below(256) as u8 >> shift.below(8));
+        assert!(survives(&bytes), "round {round}");
+    }
+}
+
+#[test]
+fn planes_out_of_order_and_cameras_too_few_are_refused() {
+    let bundle = Bundle::parse(sound()).expect("sound");
+    let (planes, keys) = (bundle.planes(), bundle.key_count());
+    let refusal = |planes: &[u8], cameras: &[u8]| {
+        let bytes = with_path(|path| (path.planes, path.cameras) = (planes, cameras));
+        Bundle::parse(&bytes).err()
+    };
+    let cameras = vec![0x11; keys * CAMERA_BYTES];
+    let all = planes.as_flattened();
+    assert_eq!(refusal(all, &cameras), None);
+    assert_eq!(refusal(&[], &[]), None, "planes are optional");
+    assert!(planes.len() > 1, "more than one plane belongs to the test");
+    let reversed: Vec<u8> = planes.iter().rev().flatten().copied().collect();
+    let twice = [&planes[0][..], all].concat();
+    for (wrong, count) in [(&reversed, planes.len()), (&twice, planes.len() + 1)] {
+        assert_eq!(refusal(wrong, &cameras), Some(BundleError::Field { name: "PATH planes", found: count as u32 }));
+    }
+    for cut in [1, PLANE_BYTES - 1] {
+        let found = all.len() - cut;
+        let whole = (planes.len() - 1) * PLANE_BYTES;
+        assert_eq!(refusal(&all[..found], &cameras), Some(BundleError::Length { name: "PATH planes", expected: whole, found }));
+    }
+    let length = |expected: usize, found: usize| Some(BundleError::Length { name: "PATH cameras", expected, found });
+    for found in [0, 1, cameras.len() - CAMERA_BYTES, cameras.len() - 1] {
+        assert_eq!(refusal(all, &cameras[..found]), length(cameras.len(), found));
+    }
+    assert_eq!(refusal(all, &[&cameras[..], &[0]].concat()), length(cameras.len(), cameras.len() + 1));
+    assert_eq!(refusal(&[], &cameras), length(0, cameras.len()), "cameras without planes");
 }
 
 #[test]
@@ -408,7 +484,7 @@ fn sections_may_come_in_any_order() {
 #[test]
 fn other_files_and_versions_are_told_apart() {
     let version = enveloped(sound(), |envelope| envelope.version = 300);
-    assert_eq!(Bundle::parse(&version).err(), Some(BundleError::Version { expected: 1, found: 300 }));
+    assert_eq!(Bundle::parse(&version).err(), Some(BundleError::Version { expected: VERSION, found: 300 }));
     let magic = enveloped(sound(), |envelope| envelope.magic = *b"CUBISM");
     assert_eq!(Bundle::parse(&magic).err(), Some(BundleError::NotABundle));
     assert_eq!(Bundle::parse(b"").err(), Some(BundleError::NotABundle));

@@ -1,0 +1,257 @@
+//! Memory: the best bundle whose player gets by with a number of bytes.
+//! Rays and options come from `tune`; the choice goes back there, with a word on what it gave up.
+//!
+//! A player holds five keys where time is cubic and three where it is straight, five rows of nodes where space is cubic and two where it is
+//! straight, and fewer layers in either where cells are larger. What each of these loses differs from scene to scene: it is measured.
+
+use crate::bake::{BakeError, Encoded, Flat, Settings};
+use crate::job::Chosen;
+use crate::report::grouped;
+use crate::tune::{Search, possible};
+use crate::verify;
+use cubist_core::format::{Envelope, PATH, Path, SPACE_CUBIC, SPACE_LINEAR, TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
+use cubist_core::{Bundle, checksum};
+
+/// Cells tried, pixels, from the one asked for on.
+const CELLS: [u32; 4] = [4, 8, 16, 32];
+
+/// A bundle that was made, and what its player needs.
+struct Tried {
+    settings: Settings,
+    encoded: Encoded,
+    memory: usize,
+}
+
+/// What was found on the way.
+#[derive(Default)]
+struct Found {
+    /// The best that fits, with its mean PSNR against exact rays, dB.
+    best: Option<(f64, Tried)>,
+    /// Time and space of all that fit.
+    fitting: Vec<[u8; 2]>,
+    /// The least memory that a bundle was measured to need.
+    smallest: Option<usize>,
+    /// Of the settings that were not tried those that promise the least memory, and how much.
+    least: Option<(usize, Settings)>,
+    /// What a bundle cannot hold.
+    exceeded: Option<BakeError>,
+}
+
+impl Search<'_> {
+    /// The best bundle that plays in `room` bytes of working memory.
+    ///
+    /// What is asked for is taken as it is where it fits. Else straight time, straight space and larger cells are tried, each as far as
+    /// the user left it open, and the best that fits is taken. Shorter intervals, whose cells see fewer labels, take more bytes: they are the
+    /// last resort.
+    ///
+    /// # Errors
+    /// [`BakeError::Ram`] where nothing fits; whatever flattening and encoding say.
+    pub(crate) fn ram(&self, room: usize) -> Result<Chosen, BakeError> {
+        let asked = self.options.settings(self.scene.playback.width);
+        let flat = self.flat(asked.atlas)?;
+        let mut found = Found::default();
+        let mut first = self.attempt(&flat, asked, &mut found)?;
+        if let Some(fits) = first.take_if(|first| first.memory <= room) {
+            return Ok(Chosen { flat, encoded: fits.encoded, settings: fits.settings, search_seconds: 0.0, warnings: Vec::new() });
+        }
+        let whole = match &first {
+            Some(first) => Some((first.memory, quality(&flat, first)?)),
+            None => None,
+        };
+        let shorter = (self.options.key_interval.is_none() && asked.key_interval > 1).then_some(asked.key_interval / 2);
+        for (turn, key_interval) in [Some(asked.key_interval), shorter].into_iter().flatten().enumerate() {
+            for (step, cell) in CELLS.into_iter().filter(|&cell| cell >= asked.cell).enumerate() {
+                self.say(step + CELLS.len() * turn, 2 * CELLS.len());
+                let tried = match first.take() {
+                    Some(first) => Some(first),
+                    None => self.attempt(&flat, Settings { cell, key_interval, ..asked }, &mut found)?,
+                };
+                let Some(tried) = tried else { continue };
+                if tried.memory <= room {
+                    // Larger cells only lose.
+                    found.consider(&flat, tried)?;
+                    break;
+                }
+                self.straighten(&flat, &tried, room, &mut found)?;
+            }
+            if found.best.is_some() {
+                break;
+            }
+        }
+        if let Some((_, settings)) = found.least.filter(|_| found.best.is_none())
+            && let Some(tried) = self.attempt(&flat, settings, &mut found)?
+            && tried.memory <= room
+        {
+            found.consider(&flat, tried)?;
+        }
+        let Some((psnr, tried)) = found.best else {
+            return Err(match found.smallest {
+                Some(smallest) => BakeError::Ram { asked: room, smallest },
+                // Not a single bundle: what was in the way is the answer.
+                None => found.exceeded.unwrap_or(BakeError::Ram { asked: room, smallest: 0 }),
+            });
+        };
+        let warnings = vec![gave_up(room, &asked, whole, &tried, psnr)];
+        Ok(Chosen { flat, encoded: tried.encoded, settings: tried.settings, search_seconds: 0.0, warnings })
+    }
+
+    /// Tries what takes less memory than `tried` on the same grid: straight time, straight space, or both.
+    fn straighten(&self, flat: &Flat, tried: &Tried, room: usize, found: &mut Found) -> Result<(), BakeError> {
+        let (time, space) = (tried.settings.time, tried.settings.space);
+        let straight_time = if self.options.time.is_none() { time.min(TIME_LINEAR) } else { time };
+        let straight_space = if self.options.space.is_none() { SPACE_LINEAR } else { space };
+        for [time, space] in [[straight_time, space], [time, straight_space], [straight_time, straight_space]] {
+            // What fits with smaller cells, or with one of the two curved, is better. And two of the three may be the same.
+            let lesser = found.fitting.iter().any(|fitting| fitting[0] >= time && fitting[1] >= space);
+            if lesser || [time, space] == [tried.settings.time, tried.settings.space] {
+                continue;
+            }
+            let settings = Settings { time, space, ..tried.settings };
+            let memory = memory_as(&tried.encoded.bundle, time, space).unwrap_or(0);
+            if memory > room {
+                if found.least.is_none_or(|(least, _)| memory < least) {
+                    found.least = Some((memory, settings));
+                }
+                continue;
+            }
+            if let Some(tried) = self.attempt(flat, settings, found)?
+                && tried.memory <= room
+            {
+                found.consider(flat, tried)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes a bundle; `None` where no bundle can hold it.
+    fn attempt(&self, flat: &Flat, settings: Settings, found: &mut Found) -> Result<Option<Tried>, BakeError> {
+        let Some(encoded) = possible(self.encode(flat, &settings), &mut found.exceeded)? else { return Ok(None) };
+        let memory = Bundle::parse(&encoded.bundle).map_err(verify::VerifyError::from)?.memory_needed();
+        found.smallest = Some(found.smallest.map_or(memory, |smallest| smallest.min(memory)));
+        Ok(Some(Tried { settings, encoded, memory }))
+    }
+}
+
+impl Found {
+    /// Makes `tried`, which fits, the best if it is.
+    fn consider(&mut self, flat: &Flat, tried: Tried) -> Result<(), BakeError> {
+        self.fitting.push([tried.settings.time, tried.settings.space]);
+        let psnr = quality(flat, &tried)?;
+        if self.best.as_ref().is_none_or(|(most, _)| psnr > *most) {
+            self.best = Some((psnr, tried));
+        }
+        Ok(())
+    }
+}
+
+/// Mean PSNR against exact rays, dB.
+fn quality(flat: &Flat, tried: &Tried) -> Result<f64, BakeError> {
+    Ok(verify::against_exact(&tried.encoded.bundle, &flat.atlas, &|_, _| {})?.psnr_mean)
+}
+
+/// The memory that a player of `bundle` would need if its time and its space were others, with the same layers; `None` if that is no bundle.
+fn memory_as(bundle: &[u8], time: u8, space: u8) -> Option<usize> {
+    let section;
+    let (mut envelope, _) = postcard::take_from_bytes::<Envelope<'_>>(bundle).ok()?;
+    let place = envelope.sections.iter_mut().find(|section| section.tag == PATH)?;
+    let path: Path<'_> = postcard::from_bytes(place.bytes).ok()?;
+    section = postcard::to_stdvec(&Path { time, space, ..path }).ok()?;
+    place.bytes = &section;
+    let mut bytes = postcard::to_stdvec(&envelope).ok()?;
+    bytes.extend(checksum(&bytes).to_le_bytes());
+    Some(Bundle::parse(&bytes).ok()?.memory_needed())
+}
+
+/// What the user should know: how `tried` differs from what was `asked` for, and what that costs. `whole`: memory and PSNR, dB, of that.
+fn gave_up(room: usize, asked: &Settings, whole: Option<(usize, f64)>, tried: &Tried, psnr: f64) -> String {
+    let Settings { time, space, cell, key_interval, .. } = tried.settings;
+    let time_name = |time| match time {
+        TIME_HOLD => "hold",
+        TIME_LINEAR => "linear",
+        _ => "cubic",
+    };
+    let space_name = |space| if space == SPACE_CUBIC { "cubic" } else { "linear" };
+    let changes = [
+        (time != asked.time).then(|| format!("--time {} instead of {}", time_name(time), time_name(asked.time))),
+        (space != asked.space).then(|| format!("--space {} instead of {}", space_name(space), space_name(asked.space))),
+        (cell != asked.cell).then(|| format!("--cell {cell} instead of {}", asked.cell)),
+        (key_interval != asked.key_interval).then(|| format!("--key-interval {key_interval} instead of {}", asked.key_interval)),
+    ];
+    let changes: Vec<String> = changes.into_iter().flatten().collect();
+    let cost = match whole {
+        Some((memory, most)) => format!("{psnr:.2} dB in {} bytes, where {most:.2} dB take {}", grouped(tried.memory), grouped(memory)),
+        None => format!("{psnr:.2} dB in {} bytes", grouped(tried.memory)),
+    };
+    format!("--ram {room}: to fit, the bundle has {}: {cost}", changes.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::{Goal, Options, TruthFrames, bake_scene};
+    use crate::report::Report;
+    use crate::scene::{Scene, builtin};
+
+    fn small() -> Scene {
+        let mut scene = builtin::build("cone-orbit").unwrap();
+        (scene.playback.width, scene.playback.height, scene.playback.frames) = (96, 72, 17);
+        scene
+    }
+
+    fn bake(room: Option<usize>, options: Options) -> Result<(usize, Vec<u8>, Report), BakeError> {
+        let goal = room.map_or(Goal::AsSet, Goal::Ram);
+        let (bytes, report) = bake_scene(&small(), &Options { goal, truth: TruthFrames::None, ..options }, &|_, _| {})?;
+        let memory = Bundle::parse(&bytes).unwrap().memory_needed();
+        assert_eq!(report.memory.workspace, memory);
+        assert!(room.is_none_or(|room| memory <= room), "{memory} {room:?}");
+        Ok((memory, bytes, report))
+    }
+
+    fn kind(bytes: &[u8]) -> (u8, u8, u8) {
+        let bundle = Bundle::parse(bytes).unwrap();
+        (bundle.path().time, bundle.path().space, bundle.path().cell_log2)
+    }
+
+    #[test]
+    fn what_fits_is_left_as_it_is() {
+        let (memory, plain, _) = bake(None, Options::default()).unwrap();
+        let (_, bytes, report) = bake(Some(memory), Options::default()).unwrap();
+        assert!(bytes == plain && report.warnings.iter().all(|warning| !warning.contains("--ram")), "{:?}", report.warnings);
+        // A byte less, and something has to go: the cheapest loss, with its price.
+        let (less, bytes, report) = bake(Some(memory - 1), Options::default()).unwrap();
+        let warning = report.warnings.iter().find(|warning| warning.contains("--ram")).unwrap();
+        assert!(less < memory && bytes != plain && warning.contains(&grouped(memory)) && warning.contains("dB"), "{warning}");
+    }
+
+    #[test]
+    fn straight_time_saves_two_keys() {
+        let asked = Options { space: Some(SPACE_CUBIC), ..Options::default() };
+        let (_, curved, _) = bake(None, asked).unwrap();
+        let straight = memory_as(&curved, TIME_LINEAR, SPACE_CUBIC).unwrap();
+        let (memory, bytes, report) = bake(Some(straight + 64), asked).unwrap();
+        assert_eq!((kind(&bytes), report.grid.cell), ((TIME_LINEAR, SPACE_CUBIC, 3), 8), "{memory}");
+        assert!(report.warnings.iter().any(|warning| warning.contains("--time linear instead of cubic")), "{:?}", report.warnings);
+        // What the user sets stays: cells have to grow instead.
+        let (_, bytes, _) = bake(Some(straight), Options { time: Some(TIME_CUBIC), ..asked }).unwrap();
+        assert_eq!(kind(&bytes), (TIME_CUBIC, SPACE_CUBIC, 4));
+    }
+
+    #[test]
+    fn larger_cells_come_when_straight_lines_do_not_do() {
+        let (_, curved, _) = bake(None, Options::default()).unwrap();
+        let straight = memory_as(&curved, TIME_LINEAR, SPACE_LINEAR).unwrap();
+        let (_, bytes, report) = bake(Some(straight * 9 / 10), Options::default()).unwrap();
+        assert!(kind(&bytes).2 > 3 && report.grid.cell > 8, "{:?}", kind(&bytes));
+        assert!(report.warnings.iter().any(|warning| warning.contains("instead of 8")), "{:?}", report.warnings);
+    }
+
+    #[test]
+    fn what_is_out_of_reach_is_refused_with_the_least_there_is() {
+        let Err(error @ BakeError::Ram { asked: 1_000, smallest }) = bake(Some(1_000), Options::default()) else {
+            panic!("contexts alone take more")
+        };
+        assert!(error.to_string().contains(&smallest.to_string()) && error.to_string().contains("--size"), "{error}");
+        let (memory, ..) = bake(Some(smallest), Options::default()).unwrap();
+        assert_eq!(memory, smallest, "what is named can be had");
+    }
+}
