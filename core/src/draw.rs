@@ -133,6 +133,49 @@ impl<'d, 'a> Drawing<'d, 'a> {
     }
 }
 
+impl Drawing<'_, '_> {
+    /// Draws the mixed blocks of pixel row `y`, which was drawn last, once more: every pixel as `mean` has it of four, a quarter of a pixel
+    /// off its centre both ways.
+    pub fn smooth<P: Paint>(&self, y: u32, out: &mut [P::Pixel], work: &mut Work, paint: &P, mean: impl Fn([P::Pixel; 4]) -> P::Pixel) {
+        let log2 = self.site.log2();
+        let width = self.site.bundle.size().0 as usize;
+        let drawn = out.len().min(width);
+        let out = out.get_mut(..drawn).unwrap_or(&mut []);
+        for mixed in self.plan.mixed.get(..self.plan.mixes).unwrap_or(&[]) {
+            let first = usize::from(mixed.block).wrapping_shl(log2);
+            let last = first.wrapping_add(1 << log2).min(out.len());
+            let Some(pixels) = out.get_mut(first..last) else { break };
+            let mut samples = [[P::Pixel::default(); 32]; 4];
+            for (samples, beside) in samples.iter_mut().zip([[-1, -1], [1, -1], [-1, 1], [1, 1]]) {
+                if let Some(samples) = samples.get_mut(..pixels.len()) {
+                    block::<P, false>(&self.site, *mixed, y, samples, paint, Some(beside));
+                }
+            }
+            let [a, b, c, d] = &samples;
+            let samples = a.iter().zip(b).zip(c.iter().zip(d));
+            for (pixel, ((&a, &b), (&c, &d))) in pixels.iter_mut().zip(samples) {
+                *pixel = mean([a, b, c, d]);
+            }
+            work.smoothed_pixels = work.smoothed_pixels.wrapping_add(pixels.len() as u32);
+        }
+    }
+}
+
+/// The mean of four colours, RGB565, rounded to nearest, halves up.
+#[must_use]
+pub const fn mean([a, b, c, d]: [u16; 4]) -> u16 {
+    // Red and blue apart from green, so that sums of four have room: bits 0..5, 11..16, and 5..11 above them.
+    const fn spread(colour: u16) -> u32 {
+        let colour = colour as u32;
+        (colour | colour << 16) & 0x07e0_f81f
+    }
+    // Two in the bit below each component rounds.
+    const HALF: u32 = 2 | 2 << 11 | 2 << 21;
+    let sum = spread(a).wrapping_add(spread(b)).wrapping_add(spread(c)).wrapping_add(spread(d)).wrapping_add(HALF);
+    let mean = sum >> 2 & 0x07e0_f81f;
+    (mean | mean >> 16) as u16
+}
+
 /// A run's pixels by the width of the picture: those that `plan` has windows for.
 #[inline(never)]
 fn by_width<P: Paint>(paint: &P, run: Run, edges: &mut [Edge], out: &mut [P::Pixel], log2: u32, width_log2: u32) {
@@ -176,7 +219,7 @@ fn mix<P: Paint, const EIGHT: bool>(site: &Site<'_, '_, '_>, mixed: &[Mixed], y:
         let Some(pixels) = out.get_mut(first..last) else { break };
         // The most frequent length has loops of its own.
         match <&mut [P::Pixel; 4]>::try_from(&mut *pixels) {
-            Ok(four) if EIGHT => block::<P, EIGHT>(site, *mixed, y, four, paint),
+            Ok(four) if EIGHT => block::<P, EIGHT>(site, *mixed, y, four, paint, None),
             _ => any_block(site, *mixed, y, pixels, paint),
         }
     }
@@ -185,12 +228,20 @@ fn mix<P: Paint, const EIGHT: bool>(site: &Site<'_, '_, '_>, mixed: &[Mixed], y:
 /// A block of any length.
 #[inline(never)]
 fn any_block<P: Paint>(site: &Site<'_, '_, '_>, mixed: Mixed, y: u32, pixels: &mut [P::Pixel], paint: &P) {
-    block::<P, false>(site, mixed, y, pixels, paint);
+    block::<P, false>(site, mixed, y, pixels, paint, None);
 }
 
-/// One mixed block, front to back: the frontmost sheet that covers a pixel shows.
+/// One mixed block, front to back: the frontmost sheet that covers a pixel shows; at pixels' centres, or `beside` them, quarters of a
+/// pixel across and down.
 #[inline(always)]
-fn block<P: Paint, const EIGHT: bool>(site: &Site<'_, '_, '_>, mixed: Mixed, y: u32, pixels: &mut [P::Pixel], paint: &P) {
+fn block<P: Paint, const EIGHT: bool>(
+    site: &Site<'_, '_, '_>,
+    mixed: Mixed,
+    y: u32,
+    pixels: &mut [P::Pixel],
+    paint: &P,
+    beside: Option<[i32; 2]>,
+) {
     let (log2, cell) = if EIGHT { (2, 3) } else { (site.log2(), site.bundle.grid().log2) };
     let row = y & (1u32 << log2).wrapping_sub(1);
     let texture = site.bundle.texture();
@@ -208,7 +259,14 @@ fn block<P: Paint, const EIGHT: bool>(site: &Site<'_, '_, '_>, mixed: Mixed, y: 
         if tested && sheet.test() != CHART {
             let step = y & (1u32 << cell).wrapping_sub(1);
             let first = u32::from(mixed.block).wrapping_shl(log2) & (1u32 << cell).wrapping_sub(1);
-            let positive = |which: usize| Field::new(block.field(sheet, which), step, cell, first).positive(pixels.len());
+            let positive = |which: usize| {
+                let corners = block.field(sheet, which);
+                match beside {
+                    None => Field::new(corners, step, cell, first),
+                    Some(beside) => Field::beside(corners, step, cell, first, beside),
+                }
+                .positive(pixels.len())
+            };
             shown &= positive(0);
             if record.flags & STRIP != 0 {
                 shown &= positive(1);
@@ -217,7 +275,10 @@ fn block<P: Paint, const EIGHT: bool>(site: &Site<'_, '_, '_>, mixed: Mixed, y: 
         if shown == 0 {
             continue;
         }
-        let span = Span::new(block.corners(sheet), row, log2);
+        let span = match beside {
+            None => Span::new(block.corners(sheet), row, log2),
+            Some(beside) => Span::beside(block.corners(sheet), row, log2, beside),
+        };
         if tested && sheet.test() != FIELD {
             shown = span::inside(&Chart::new(&record), shown, pixels.len(), span, &texture);
         }
@@ -231,5 +292,26 @@ fn block<P: Paint, const EIGHT: bool>(site: &Site<'_, '_, '_>, mixed: Mixed, y: 
         if left.wrapping_shr(index as u32) & 1 != 0 {
             *pixel = P::Pixel::default();
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::mean;
+
+    #[test]
+    fn means_are_those_of_each_component() {
+        let colour = |r: u16, g: u16, b: u16| r << 11 | g << 5 | b;
+        let mut seed = 7u32;
+        let mut next = |below: u16| {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (seed >> 16) as u16 % below
+        };
+        for _ in 0..2000 {
+            let parts: [[u16; 3]; 4] = core::array::from_fn(|_| [next(32), next(64), next(32)]);
+            let [r, g, b] = [0, 1, 2].map(|part: usize| (parts.iter().map(|p| p[part]).sum::<u16>() + 2) >> 2);
+            assert_eq!(mean(parts.map(|[r, g, b]| colour(r, g, b))), colour(r, g, b));
+        }
+        assert_eq!(mean([u16::MAX; 4]), u16::MAX);
     }
 }

@@ -138,6 +138,17 @@ impl Span {
         Self { from, step }
     }
 
+    /// Like [`Span::new`], `across` and `down` quarters of a pixel beside the pixels' centres.
+    #[must_use]
+    pub const fn beside(corners: Corners, row: u32, log2: u32, [across, down]: [i32; 2]) -> Self {
+        // In quarters of pixels there are four times as many.
+        let Self { from, step } = Self::new(corners, row.wrapping_mul(4).wrapping_add_signed(down), log2.wrapping_add(2));
+        Self {
+            from: PlayUv { u: from.u.wrapping_add(step.u.wrapping_mul(across)), v: from.v.wrapping_add(step.v.wrapping_mul(across)) },
+            step: PlayUv { u: step.u.wrapping_mul(4), v: step.v.wrapping_mul(4) },
+        }
+    }
+
     /// The position `pixels` pixels on.
     const fn at(&self, pixels: usize) -> PlayUv {
         let count = pixels as i32;
@@ -185,6 +196,14 @@ impl Field {
         let (from, to) = (down(a, c, row, log2), down(b, d, row, log2));
         let step = to.wrapping_sub(from).wrapping_add(half) >> log2;
         Self { from: from.wrapping_add(step.wrapping_mul(first as i32)), step }
+    }
+
+    /// Like [`Field::new`], `across` and `down` quarters of a pixel beside the pixels' centres.
+    #[must_use]
+    pub const fn beside(corners: [i32; 4], row: u32, log2: u32, first: u32, [across, down]: [i32; 2]) -> Self {
+        let first = first.wrapping_mul(4).wrapping_add_signed(across);
+        let Self { from, step } = Self::new(corners, row.wrapping_mul(4).wrapping_add_signed(down), log2.wrapping_add(2), first);
+        Self { from, step: step.wrapping_mul(4) }
     }
 
     /// At which of the next `pixels` pixels the field is positive: a bit each.

@@ -21,6 +21,8 @@ pub struct Work {
     pub torn_pixels: u32,
     /// Coverage tests made for them.
     pub coverage_tests: u32,
+    /// Pixels that [`crate::Player::smooth_row`] made of four.
+    pub smoothed_pixels: u32,
 }
 
 /// Where a pixel comes from.
