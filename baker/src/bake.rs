@@ -49,25 +49,27 @@ pub enum BakeError {
         smallest: u64,
     },
     /// No bundle that a search found reaches the quality.
-    #[error(
-        "--psnr: found at most {nearest:.2} dB, expected {asked:.2} dB; ask for less, and leave --cell and --key-interval to the search"
-    )]
+    #[error("--psnr: found at most {nearest:.2} dB, expected {asked:.2} dB; ask for less{held}")]
     Psnr {
         /// The mean PSNR asked for, dB.
         asked: f64,
         /// The best that a search found, dB.
         nearest: f64,
+        /// What else helps: leaving options to the search that are given; empty where none is.
+        held: String,
     },
     /// No bundle that a search found plays in the memory there is.
     #[error(
-        "--ram: expected room for {smallest} bytes, the least that a player of this scene was found to need, found {asked}; raise it, lower \
-         --size, or leave --time, --space, --cell and --key-interval to the search"
+        "--ram: expected room for {smallest} bytes, the least that a player of this scene was found to need, found {asked}; raise it, or \
+         lower --size{held}"
     )]
     Ram {
         /// Bytes allowed.
         asked: usize,
         /// Bytes of working memory of the least demanding bundle found.
         smallest: usize,
+        /// What else helps: leaving options to the search that are given; empty where none is.
+        held: String,
     },
     /// The player refuses what was baked: a fault of the baker.
     #[error(transparent)]

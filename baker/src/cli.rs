@@ -74,7 +74,7 @@ pub struct Bake {
     pub even_keys: bool,
     /// How surfaces move between keys [default: cubic].
     ///
-    /// The player holds two keys more for cubic, which is about a third of its memory; linear and hold take the same.
+    /// The player holds two keys more for cubic, which is about a quarter of its memory; linear and hold take the same.
     #[arg(long, value_enum, value_name = "KIND")]
     pub time: Option<Time>,
     /// How surfaces bend between the corners of cells [default: cubic].

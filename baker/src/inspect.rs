@@ -1,7 +1,8 @@
 //! Inspection: what a bundle holds, byte by section.
 //! Bytes come from a file or the encoder; figures go to `cubist-bake inspect` and to the report's byte counts.
 
-use cubist_core::format::{ATLAS, FIXED, INFO, LABELS, MASK, MASKED, PATH, STRIP, TIME_HOLD, TIME_LINEAR, VERSION};
+use cubist_core::format::{ATLAS, FIXED, INFO, LABELS, MASK, MASKED, PATH, SPACE_LINEAR, STRIP, TIME_HOLD, TIME_LINEAR, VERSION};
+use cubist_core::plane::Plane;
 use cubist_core::{Bundle, BundleError};
 use serde::Serialize;
 
@@ -29,6 +30,23 @@ pub struct KeyInfo {
     pub independent: bool,
     /// Bytes of its record.
     pub bytes: usize,
+    /// From where it looks, in the bundle's own units; `None` without planes.
+    pub eye: Option<[i32; 3]>,
+}
+
+/// A plane that positions are told from, in the bundle's own units.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct PlaneInfo {
+    /// The flat label.
+    pub label: u8,
+    /// The axes are 2^this times as long as a texel.
+    pub shift: u8,
+    /// The point of position (0, 0).
+    pub origin: [i32; 3],
+    /// A texel along u, times 2^shift.
+    pub along_u: [i32; 3],
+    /// A texel along v, times 2^shift.
+    pub along_v: [i32; 3],
 }
 
 /// A label.
@@ -65,10 +83,16 @@ pub struct PathInfo {
     pub cells: [u32; 2],
     /// How layers move between keys.
     pub time: &'static str,
+    /// How layers bend between nodes.
+    pub space: &'static str,
     /// Coordinates are coded in steps of one over this of a texel.
     pub steps_a_texel: u32,
     /// Bytes of the key table.
     pub table_bytes: usize,
+    /// Bytes of the planes.
+    pub plane_bytes: usize,
+    /// Bytes of the keys' cameras.
+    pub camera_bytes: usize,
     /// Bytes of the key records.
     pub record_bytes: usize,
 }
@@ -122,6 +146,8 @@ pub struct Inspection {
     pub path: PathInfo,
     /// The keys.
     pub keys: Vec<KeyInfo>,
+    /// The planes.
+    pub planes: Vec<PlaneInfo>,
     /// The source image's header.
     pub image: ImageInfo,
     /// The palette, "#rrggbb".
@@ -190,13 +216,25 @@ impl Inspection {
                     TIME_LINEAR => "linear",
                     _ => "cubic",
                 },
+                space: if path.space == SPACE_LINEAR { "linear" } else { "cubic" },
                 steps_a_texel: (1 << path.key_bits) >> path.step_log2,
                 table_bytes: path.table.len(),
+                plane_bytes: path.planes.len(),
+                camera_bytes: path.cameras.len(),
                 record_bytes: path.records.len(),
             },
             keys: (0..bundle.key_count())
-                .map(|key| (bundle.key(key), bundle.record(key).len()))
-                .map(|(key, bytes)| KeyInfo { frame: key.frame, independent: key.independent, bytes })
+                .map(|index| {
+                    let (key, bytes) = (bundle.key(index), bundle.record(index).len());
+                    let eye = (!path.cameras.is_empty()).then(|| bundle.camera(index).eye);
+                    KeyInfo { frame: key.frame, independent: key.independent, bytes, eye }
+                })
+                .collect(),
+            planes: bundle
+                .planes()
+                .iter()
+                .map(Plane::from_bytes)
+                .map(|Plane { label, shift, origin, along_u, along_v }| PlaneInfo { label, shift, origin, along_u, along_v })
                 .collect(),
             image: ImageInfo {
                 size: [1 << atlas.width_log2, u32::from(atlas.height)],
@@ -227,10 +265,10 @@ impl Inspection {
         self.sections.iter().filter(|s| s.tag == tag).map(|s| s.bytes).sum()
     }
 
-    /// Bytes of the keys: their records and their table.
+    /// Bytes of the keys: their table, their records, and the planes and cameras that these are told from.
     #[must_use]
     pub fn key_bytes(&self) -> usize {
-        self.path.table_bytes + self.path.record_bytes
+        self.path.table_bytes + self.path.plane_bytes + self.path.camera_bytes + self.path.record_bytes
     }
 
     /// The inspection as lines of text.
@@ -257,23 +295,32 @@ impl Inspection {
         let (p, [width, height]) = (&self.path, self.path.size);
         line(format!("PATH  {} frames of {width} x {height} at {} frames/s, looping: {}", p.frames, p.fps, yes(p.looping)));
         line(format!(
-            "      grid: {} x {} cells of {} pixels; time: {}; coordinates in 1/{} texel",
-            p.cells[0], p.cells[1], p.cell, p.time, p.steps_a_texel
+            "      grid: {} x {} cells of {} pixels; time: {}; space: {}; coordinates in 1/{} texel",
+            p.cells[0], p.cells[1], p.cell, p.time, p.space, p.steps_a_texel
         ));
         line(format!(
-            "      keys: {}, table {} bytes, records {} bytes, {:.1} bytes a frame",
+            "      keys: {}, table {} bytes, planes {} bytes, cameras {} bytes, records {} bytes, {:.1} bytes a frame",
             self.keys.len(),
             p.table_bytes,
+            p.plane_bytes,
+            p.camera_bytes,
             p.record_bytes,
             self.key_bytes() as f64 / f64::from(p.frames)
         ));
+        let vector = |[x, y, z]: [i32; 3]| format!("({x}, {y}, {z})");
         for (index, key) in self.keys.iter().enumerate() {
             line(format!(
-                "      key {index:>4} at frame {:>5} {:>8} bytes{}",
+                "      key {index:>4} at frame {:>5} {:>8} bytes  {:11}{}",
                 key.frame,
                 key.bytes,
-                if key.independent { "  independent" } else { "" }
+                if key.independent { "independent" } else { "" },
+                key.eye.map_or_else(String::new, |eye| format!("  eye {}", vector(eye)))
             ));
+        }
+        for plane in &self.planes {
+            let PlaneInfo { label, shift, origin, along_u, along_v } = *plane;
+            let (origin, u, v) = (vector(origin), vector(along_u), vector(along_v));
+            line(format!("      plane of label {label:>3}  {origin} + u {u} + v {v}; u, v in 1/{} texel", 1u64 << shift.min(63)));
         }
         let image = &self.image;
         let covered = image

@@ -93,6 +93,19 @@ impl Options {
         settings.adapt_keys = !self.even_keys;
         settings
     }
+
+    /// What else helps where a search finds nothing: to leave to it what is given; nothing where nothing is. `cells`: the search would try other
+    /// cells than the one that is given.
+    pub(crate) fn held(&self, cells: bool) -> String {
+        let all = [
+            (cells && self.cell.is_some(), "--cell"),
+            (self.key_interval.is_some(), "--key-interval"),
+            (!cells && self.time.is_some(), "--time"),
+            (!cells && self.space.is_some(), "--space"),
+        ];
+        let given: Vec<&str> = all.into_iter().filter_map(|(given, name)| given.then_some(name)).collect();
+        if given.is_empty() { String::new() } else { format!(", or leave {} to the search", given.join(" and ")) }
+    }
 }
 
 /// A finished job.

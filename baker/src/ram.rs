@@ -9,7 +9,7 @@ use crate::job::Chosen;
 use crate::report::grouped;
 use crate::tune::{Search, possible};
 use crate::verify;
-use cubist_core::format::{Envelope, PATH, Path, SPACE_CUBIC, SPACE_LINEAR, TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
+use cubist_core::format::{Envelope, PATH, Path, SPACE_CUBIC, SPACE_LINEAR, TIME_HOLD, TIME_LINEAR};
 use cubist_core::{Bundle, checksum};
 
 /// Cells tried, pixels, from the one asked for on.
@@ -86,9 +86,9 @@ impl Search<'_> {
         }
         let Some((psnr, tried)) = found.best else {
             return Err(match found.smallest {
-                Some(smallest) => BakeError::Ram { asked: room, smallest },
+                Some(smallest) => BakeError::Ram { asked: room, smallest, held: self.options.held(false) },
                 // Not a single bundle: what was in the way is the answer.
-                None => found.exceeded.unwrap_or(BakeError::Ram { asked: room, smallest: 0 }),
+                None => found.exceeded.unwrap_or(BakeError::Ram { asked: room, smallest: 0, held: String::new() }),
             });
         };
         let warnings = vec![gave_up(room, &asked, whole, &tried, psnr)];
@@ -179,8 +179,10 @@ fn gave_up(room: usize, asked: &Settings, whole: Option<(usize, f64)>, tried: &T
     ];
     let changes: Vec<String> = changes.into_iter().flatten().collect();
     let cost = match whole {
-        Some((memory, most)) => format!("{psnr:.2} dB in {} bytes, where {most:.2} dB take {}", grouped(tried.memory), grouped(memory)),
-        None => format!("{psnr:.2} dB in {} bytes", grouped(tried.memory)),
+        Some((memory, most)) => {
+            format!("{psnr:.2} dB in {} bytes of memory, where {most:.2} dB take {}", grouped(tried.memory), grouped(memory))
+        }
+        None => format!("{psnr:.2} dB in {} bytes of memory", grouped(tried.memory)),
     };
     format!("--ram {room}: to fit, the bundle has {}: {cost}", changes.join(", "))
 }
@@ -191,6 +193,7 @@ mod tests {
     use crate::job::{Goal, Options, TruthFrames, bake_scene};
     use crate::report::Report;
     use crate::scene::{Scene, builtin};
+    use cubist_core::format::TIME_CUBIC;
 
     fn small() -> Scene {
         let mut scene = builtin::build("cone-orbit").unwrap();
@@ -247,10 +250,11 @@ mod tests {
 
     #[test]
     fn what_is_out_of_reach_is_refused_with_the_least_there_is() {
-        let Err(error @ BakeError::Ram { asked: 1_000, smallest }) = bake(Some(1_000), Options::default()) else {
+        let Err(error @ BakeError::Ram { asked: 1_000, smallest, .. }) = bake(Some(1_000), Options::default()) else {
             panic!("contexts alone take more")
         };
-        assert!(error.to_string().contains(&smallest.to_string()) && error.to_string().contains("--size"), "{error}");
+        let text = error.to_string();
+        assert!(text.contains(&smallest.to_string()) && text.contains("--size") && !text.contains("to the search"), "{error}");
         let (memory, ..) = bake(Some(smallest), Options::default()).unwrap();
         assert_eq!(memory, smallest, "what is named can be had");
     }

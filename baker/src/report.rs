@@ -54,7 +54,7 @@ pub struct Bytes {
     pub labels: usize,
     /// The mask.
     pub mask: usize,
-    /// The key records and their table.
+    /// The key records, their table, and the planes and cameras that positions are told from.
     pub keys: usize,
     /// Headers, limits, checksum, a text for people.
     pub other: usize,

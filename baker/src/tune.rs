@@ -260,7 +260,7 @@ impl Search<'_> {
                 return self.finish(flat, settings, coarser.into_iter().collect());
             }
         }
-        Err(BakeError::Psnr { asked, nearest })
+        Err(BakeError::Psnr { asked, nearest, held: self.options.held(true) })
     }
 
     /// The settings of the smallest bundle that reaches `asked` at one source image; `nearest` is raised to what is reached.
@@ -428,5 +428,11 @@ mod tests {
         assert!(report.quality.psnr_mean >= reached - 1.0 && bytes.len() <= plain.len());
         let Err(error @ BakeError::Psnr { nearest, .. }) = bake(98.0) else { panic!("98 dB are out of reach") };
         assert!(nearest > reached && error.to_string().contains(&format!("{nearest:.2}")), "{error}");
+        // What was not given is not to blame.
+        assert!(!error.to_string().contains("--cell"), "{error}");
+        let options =
+            Options { goal: Goal::Psnr(98.0), cell: Some(16), key_interval: Some(4), truth: TruthFrames::None, ..Options::default() };
+        let error = bake_scene(&scene, &options, &|_, _| {}).err().unwrap();
+        assert!(error.to_string().ends_with("ask for less, or leave --cell and --key-interval to the search"), "{error}");
     }
 }

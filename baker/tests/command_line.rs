@@ -58,6 +58,24 @@ fn what_cannot_be_written_is_said_before_the_work() {
     assert_eq!(names(dir.path()), ["a.obj", "plain"]);
 }
 
+#[test]
+fn memory_is_kept_to_or_what_it_takes_is_said() {
+    let dir = folder();
+    refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--ram", "1K"]), 1, "--ram: expected room for ");
+    refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--ram", "1K", "--time", "cubic"]), 1, "or leave --time to the search");
+    refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--ram", "1K", "--budget", "9K"]), 2, "cannot be used with");
+    assert_eq!(names(dir.path()), ["a.obj"]);
+    let output = bake(dir.path(), "a.obj", &["-o", "a.cubist", "--report", "a.json"]);
+    assert_eq!(output.status.code(), Some(0));
+    let report = || serde_json::from_slice::<serde_json::Value>(&std::fs::read(dir.path().join("a.json")).unwrap()).unwrap();
+    let least = (report()["memory"]["workspace"].as_u64().unwrap() - 1).to_string();
+    let output = bake(dir.path(), "a.obj", &["-o", "a.cubist", "--report", "a.json", "--ram", &least]);
+    let said = format!("--ram {least}: to fit, the bundle has ");
+    assert!(String::from_utf8_lossy(&output.stderr).contains(&said), "{output:?}");
+    assert!(report()["warnings"].as_array().unwrap().iter().any(|warning| warning.as_str().unwrap().starts_with(&said)));
+    assert!(report()["memory"]["workspace"].as_u64().unwrap() < least.parse().unwrap());
+}
+
 #[cfg(unix)]
 #[test]
 fn devices_are_no_scenes_and_stay_devices() {
