@@ -90,6 +90,9 @@ impl Sums {
     }
 }
 
+/// Where a layer is known to be, texels, and how sure that is, 0..=1; `None` where nothing is known.
+pub type Prior = Option<([f32; 2], f32)>;
+
 /// What one fit is about.
 pub struct Problem<'a, T> {
     /// The grid.
@@ -103,7 +106,7 @@ pub struct Problem<'a, T> {
     /// How they are interpolated in space.
     pub space: u8,
     /// What layers are held to where pixels say little: a position for each; `None`: nothing.
-    pub prior: Option<&'a [Option<([f32; 2], f32)>]>,
+    pub prior: Option<&'a [Prior]>,
     /// Values that a fit has already: pixels that are far from them count less. `None`: all count the same.
     pub known: Option<&'a [[f32; 2]]>,
     /// The target and weight of a G-buffer pixel for the sheet at a place in the list of its cell (interval times cells plus cell);
@@ -122,7 +125,7 @@ pub struct Fit {
 
 /// Fits the positions of all layers.
 #[must_use]
-pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers, prior: &[Option<([f32; 2], f32)>]) -> Fit {
+pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers, prior: &[Prior]) -> Fit {
     let target = |index: usize, sheet: usize, pixel: usize| {
         let own = gbuffer.label[pixel] == u16::from(sheets.lists[index][sheet]);
         own.then(|| (gbuffer.uv[pixel], 1.0))
@@ -354,10 +357,8 @@ fn regularised(volume: f32, values: &[[f32; 2]; 8]) -> [[f32; 2]; 8] {
     let transform = |mut values: [[f32; 2]; 8]| {
         for bit in [1, 2, 4] {
             for low in (0..8).filter(|at| at & bit == 0) {
-                for axis in 0..2 {
-                    let (a, b) = (values[low][axis], values[low | bit][axis]);
-                    (values[low][axis], values[low | bit][axis]) = (a + b, a - b);
-                }
+                let ([a, b], [c, d]) = (values[low], values[low | bit]);
+                (values[low], values[low | bit]) = ([a + c, b + d], [a - c, b - d]);
             }
         }
         values
@@ -458,14 +459,11 @@ fn dot(a: &[[f64; 2]], b: &[[f64; 2]]) -> [f64; 2] {
     a.iter().zip(b).fold([0.0; 2], |[u, v], (a, b)| [u + a[0] * b[0], v + a[1] * b[1]])
 }
 
+/// Writes the product of a matrix with the first vector into the second.
+type Product<'a> = &'a dyn Fn(&[[f64; 2]], &mut [[f64; 2]]);
+
 /// Conjugate gradients with a diagonal preconditioner, u and v side by side.
-fn conjugate_gradients(
-    multiply: &dyn Fn(&[[f64; 2]], &mut [[f64; 2]]),
-    right: &[[f64; 2]],
-    diagonal: &[f64],
-    start: Vec<[f64; 2]>,
-    steps: usize,
-) -> Vec<[f64; 2]> {
+fn conjugate_gradients(multiply: Product<'_>, right: &[[f64; 2]], diagonal: &[f64], start: Vec<[f64; 2]>, steps: usize) -> Vec<[f64; 2]> {
     let scaled = |r: &[[f64; 2]]| -> Vec<[f64; 2]> { r.iter().zip(diagonal).map(|(r, d)| [r[0] / d, r[1] / d]).collect() };
     let mut x = start;
     let mut product = vec![[0.0; 2]; x.len()];

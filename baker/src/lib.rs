@@ -21,6 +21,7 @@ pub mod patch;
 pub mod planes;
 pub mod ram;
 pub mod report;
+mod samples;
 pub mod scene;
 pub mod shade;
 pub mod sheets;

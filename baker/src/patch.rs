@@ -66,8 +66,8 @@ impl Stencil {
         for (row, values) in rows.iter().enumerate() {
             points[3 * row] = values[1];
             points[3 * row + 2] = values[2];
-            for column in 0..4 {
-                add(&mut points[3 * row + 1], self.across[row][column], values[column]);
+            for (&weight, &value) in self.across[row].iter().zip(values) {
+                add(&mut points[3 * row + 1], weight, value);
             }
         }
         points
@@ -80,8 +80,8 @@ impl Stencil {
         let mut between = [[0.0; 2]; 4];
         for row in 0..3 {
             let mut values = [[0.0; 2], points[3 * row], points[3 * row + 2], [0.0; 2]];
-            for column in 0..4 {
-                add(&mut values[column], self.across[row][column], points[3 * row + 1]);
+            for (value, &weight) in values.iter_mut().zip(&self.across[row]) {
+                add(value, weight, points[3 * row + 1]);
             }
             if row == 1 {
                 between = values;

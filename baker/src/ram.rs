@@ -151,12 +151,9 @@ fn quality(flat: &Flat, tried: &Tried) -> Result<f64, BakeError> {
 
 /// The memory that a player of `bundle` would need if its time and its space were others, with the same layers; `None` if that is no bundle.
 fn memory_as(bundle: &[u8], time: u8, space: u8) -> Option<usize> {
-    let section;
+    let path = postcard::to_stdvec(&Path { time, space, ..*Bundle::parse(bundle).ok()?.path() }).ok()?;
     let (mut envelope, _) = postcard::take_from_bytes::<Envelope<'_>>(bundle).ok()?;
-    let place = envelope.sections.iter_mut().find(|section| section.tag == PATH)?;
-    let path: Path<'_> = postcard::from_bytes(place.bytes).ok()?;
-    section = postcard::to_stdvec(&Path { time, space, ..path }).ok()?;
-    place.bytes = &section;
+    envelope.sections.iter_mut().find(|section| section.tag == PATH)?.bytes = &path;
     let mut bytes = postcard::to_stdvec(&envelope).ok()?;
     bytes.extend(checksum(&bytes).to_le_bytes());
     Some(Bundle::parse(&bytes).ok()?.memory_needed())

@@ -6,10 +6,9 @@ use crate::atlas::{self, Atlas};
 use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings};
 use crate::gbuffer::Hits;
 use crate::job::{self, Chosen, Goal, Options};
-use crate::metrics;
+use crate::samples::Samples;
 use crate::scene::Scene;
 use crate::trace::Tracer;
-use crate::truth::Truth;
 use crate::verify;
 use crate::{planes, tears};
 use std::time::Instant;
@@ -28,8 +27,6 @@ const QUALITY_LAMBDAS: [f32; 3] = [1.0, 0.3, 0.1];
 const FINEST_LAMBDA: f32 = 0.01;
 /// Densities of the source image tried, of the one asked for.
 const DENSITIES: [f64; 9] = [1.0, 0.85, 0.7, 0.6, 0.5, 0.35, 0.25, 0.18, 0.125];
-/// Frames compared with the truth while searching.
-const SAMPLES: u32 = 12;
 /// Bundles that fit the budget and are measured.
 const TRIES: usize = 6;
 /// How far a predicted size may lie over the budget and still be tried.
@@ -330,53 +327,6 @@ fn image_bytes(atlas: &Atlas) -> usize {
     image.texels.len() + 2 * image.palette.len() + cubist_core::format::LABEL_BYTES * image.labels.len() + mask
 }
 
-/// Some frames of the truth.
-struct Samples {
-    frames: Vec<u32>,
-    pictures: Vec<Vec<u8>>,
-}
-
-impl Samples {
-    fn new(scene: &Scene) -> Self {
-        let truth = Truth::new(scene);
-        let frames = scattered(scene.playback.frames);
-        let pictures = frames.iter().map(|&frame| truth.frame(frame)).collect();
-        Self { frames, pictures }
-    }
-
-    /// The mean squared error of exact rays through a source image.
-    fn of_image(&self, atlas: &Atlas) -> f64 {
-        let errors = self.frames.iter().zip(&self.pictures).map(|(&frame, truth)| {
-            let exact = verify::exact_frame(atlas, frame);
-            metrics::mean_squared_error(&exact, truth)
-        });
-        errors.sum::<f64>() / self.frames.len().max(1) as f64
-    }
-
-    /// The mean squared error and the mean PSNR, dB, of a bundle.
-    fn of_bundle(&self, bundle: &[u8]) -> Result<(f64, f64), BakeError> {
-        let (mut error, mut psnr, mut truth) = (0.0, 0.0, self.pictures.iter());
-        verify::play(bundle, &self.frames, |_, played| {
-            let now = truth.next().map_or(0.0, |truth| metrics::mean_squared_error(played, truth));
-            error += now;
-            psnr += metrics::psnr(now);
-        })?;
-        let count = self.frames.len().max(1) as f64;
-        Ok((error / count, psnr / count))
-    }
-}
-
-/// Frames that lie evenly on the path but fall on keys no more often than others, whatever the interval.
-fn scattered(frames: u32) -> Vec<u32> {
-    // Multiples of the golden ratio modulo 1 spread best; 0.618.. as a 32-bit fraction.
-    const GOLDEN: u64 = 2_654_435_769;
-    let place = |i: u64| (((2 * i + 1) * GOLDEN / 2) & 0xffff_ffff) * u64::from(frames);
-    let mut out: Vec<u32> = (0..u64::from(SAMPLES)).map(|i| (place(i) >> 32) as u32).collect();
-    out.sort_unstable();
-    out.dedup();
-    out
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -387,15 +337,6 @@ mod tests {
         let mut scene = builtin::build(name).unwrap();
         (scene.playback.width, scene.playback.height, scene.playback.frames) = (64, 48, 12);
         scene
-    }
-
-    #[test]
-    fn samples_lie_everywhere() {
-        let frames = scattered(128);
-        assert_eq!(frames.len(), SAMPLES as usize);
-        assert!(frames[0] < 16 && frames[11] >= 112 && frames.windows(2).all(|w| w[1] - w[0] < 24), "{frames:?}");
-        assert!(frames.iter().filter(|f| *f % 4 == 0).count() <= 5, "{frames:?}");
-        assert_eq!(scattered(1), [0]);
     }
 
     #[test]

@@ -262,8 +262,11 @@ fn check_path<'a>(path: &Path<'a>) -> Result<&'a [[u8; KEY_BYTES]], BundleError>
     Ok(keys)
 }
 
+/// Records of planes and of cameras.
+type Records<'a> = (&'a [[u8; PLANE_BYTES]], &'a [[u8; CAMERA_BYTES]]);
+
 /// The planes and the cameras of `keys` keys.
-fn check_planes<'a>(path: &Path<'a>, keys: usize) -> Result<(&'a [[u8; PLANE_BYTES]], &'a [[u8; CAMERA_BYTES]]), BundleError> {
+fn check_planes<'a>(path: &Path<'a>, keys: usize) -> Result<Records<'a>, BundleError> {
     let (planes, rest) = path.planes.as_chunks::<PLANE_BYTES>();
     let found = path.planes.len();
     length(found.saturating_sub(rest.len()), found, "PATH planes")?;
