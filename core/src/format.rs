@@ -189,6 +189,15 @@ pub struct Path<'a> {
     pub records: &'a [u8],
 }
 
+impl Path<'_> {
+    /// Bytes of all that is stored for keys: their records and table, and the planes and cameras that positions are told from.
+    #[must_use]
+    pub const fn key_bytes(&self) -> usize {
+        let told = self.planes.len().saturating_add(self.cameras.len());
+        self.records.len().saturating_add(self.table.len()).saturating_add(told)
+    }
+}
+
 /// Upper bounds, stated by the baker. The player's memory and work follow from them: what a bundle holds beyond them is not
 /// played. [`Limits::seek_keys`] is checked against the key table when the bundle is parsed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]

@@ -101,7 +101,8 @@ impl<'a> Player<'a> {
         }
         let space = memory::workspace(bundle, memory).ok_or(too_small)?;
         let moment = bundle.moment(0);
-        let mut player = Self { bundle, space, frame: Frame(0), moment, last: None, coming: None, loaded: None, work: Work::default(), swapped: false };
+        let mut player =
+            Self { bundle, space, frame: Frame(0), moment, last: None, coming: None, loaded: None, work: Work::default(), swapped: false };
         player.set_byte_order(ByteOrder::Native);
         player.seek(Frame(0));
         Ok(player)

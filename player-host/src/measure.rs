@@ -142,7 +142,7 @@ fn document(loaded: &Loaded, bundle: &Bundle<'_>, spreads: &[Spread], seconds: f
 
 /// Bytes of the key records and their table.
 fn key_bytes(bundle: &Bundle<'_>) -> u64 {
-    (bundle.path().records.len() + bundle.path().table.len()) as u64
+    bundle.path().key_bytes() as u64
 }
 
 fn tag(section: &Section<'_>) -> String {

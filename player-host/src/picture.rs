@@ -9,19 +9,30 @@ pub struct Picture {
     width: u32,
     height: u32,
     pixels: Vec<u16>,
+    /// Outlines are antialiased.
+    smooth: bool,
 }
 
 impl Picture {
     /// A black picture of `width` x `height` pixels.
     pub fn new(width: u32, height: u32) -> Self {
-        Self { width, height, pixels: vec![0; width as usize * height as usize] }
+        Self { width, height, pixels: vec![0; width as usize * height as usize], smooth: false }
+    }
+
+    /// The same picture, with antialiased outlines from now on if `smooth`.
+    pub fn with_smooth_outlines(self, smooth: bool) -> Self {
+        Self { smooth, ..self }
     }
 
     /// Plays `frame` into the picture, which has the bundle's size; what that took comes back.
     pub fn play(&mut self, player: &mut Player<'_>, frame: u32) -> Work {
         player.seek(Frame(frame));
         for y in 0..self.height {
-            player.row(y, self.row_mut(y));
+            if self.smooth {
+                player.smooth_row(y, self.row_mut(y));
+            } else {
+                player.row(y, self.row_mut(y));
+            }
         }
         player.work()
     }

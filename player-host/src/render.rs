@@ -26,6 +26,8 @@ pub struct Plan<'p> {
     pub gif: Option<&'p Path>,
     /// Every pixel becomes a square of this side.
     pub scale: u32,
+    /// Outlines are antialiased.
+    pub smooth: bool,
 }
 
 /// Runs the command.
@@ -36,6 +38,7 @@ pub fn run(player: &mut Player<'_>, args: &Render) -> Result<()> {
         out: args.out.as_deref(),
         gif: args.gif.as_deref(),
         scale: args.scale,
+        smooth: args.smooth,
     };
     if let Some(gif) = plan.gif
         && same(gif, &args.bundle)
@@ -56,7 +59,7 @@ pub fn write(player: &mut Player<'_>, plan: &Plan<'_>) -> Result<()> {
             Usage(format!("--scale {} makes {} x {} pixels; a GIF holds at most 65535 a side", plan.scale, sides.0, sides.1)).into()
         );
     }
-    let mut picture = Picture::new(width, height);
+    let mut picture = Picture::new(width, height).with_smooth_outlines(plan.smooth);
     if let Some(folder) = plan.out {
         std::fs::create_dir_all(folder).with_context(|| format!("{}: the folder cannot be made", folder.display()))?;
         let bar = progress(frames.len() as u64, "pictures");

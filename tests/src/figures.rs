@@ -82,7 +82,7 @@ pub fn psnr(squares: u64, values: usize) -> f64 {
 /// The bundle does not parse.
 pub fn key_bytes_per_frame(bytes: &[u8]) -> Result<f64> {
     let bundle = Bundle::parse(bytes)?;
-    Ok((bundle.path().records.len() + bundle.path().table.len()) as f64 / f64::from(bundle.frames()))
+    Ok(bundle.path().key_bytes() as f64 / f64::from(bundle.frames()))
 }
 
 /// Frames a second of the host playing every frame once, in order.

@@ -7,7 +7,7 @@ use cubist_baker::bake::Settings;
 use cubist_baker::scene::{Overrides, builtin, load, load_builtin};
 use cubist_tests::codecs::ffmpeg::Ffmpeg;
 use cubist_tests::tables::document::Document;
-use cubist_tests::tables::{self, Table, codecs, coverage};
+use cubist_tests::tables::{self, Table, codecs, coverage, edges};
 use std::path::PathBuf;
 
 /// Prints the tables of the README and the docs.
@@ -50,6 +50,11 @@ enum Name {
     /// Bytes beside those of other codecs at equal PSNR and SSIM (needs ffmpeg).
     Codecs {
         /// Built-in scenes or scene files; left out: four built-in ones.
+        scenes: Vec<String>,
+    },
+    /// What antialiased outlines are worth against the antialiased scene, and what they cost.
+    Edges {
+        /// Built-in scenes or scene files; left out: five built-in ones.
         scenes: Vec<String>,
     },
 }
@@ -99,6 +104,12 @@ fn table(name: &Name, overrides: &Overrides) -> Result<Table> {
             }
             codecs::table(rows, ffmpeg.as_ref())
         }
+        Name::Edges { scenes } => {
+            for name in or_default(scenes, &edges::SCENES) {
+                rows.push(edges::measure(&tables::scene(&name, overrides)?)?);
+            }
+            edges::table(rows)
+        }
     })
 }
 
@@ -110,6 +121,7 @@ impl Name {
             Self::Scenes { .. } => "scenes",
             Self::Coverage { .. } => "coverage",
             Self::Codecs { .. } => "codecs",
+            Self::Edges { .. } => "edges",
         }
     }
 }

@@ -5,6 +5,7 @@ pub mod builtin;
 pub mod codecs;
 pub mod coverage;
 pub mod document;
+pub mod edges;
 
 use anyhow::Result;
 use cubist_baker::scene::{Overrides, Scene, load, load_builtin};
