@@ -40,7 +40,7 @@ pub fn measure(scene: &Scene) -> Result<Value> {
     let (mut plain, mut smooth, mut smoothed) = (Drawn::default(), Drawn::default(), 0u64);
     play::visit(&encoded.bundle, frames.iter().copied(), |frame, player| {
         let exact = truth.frame(frame);
-        let mut draw = |drawn: &mut Drawn, player: &mut Player<'_>, row: fn(&mut Player<'_>, u32, &mut [u16])| {
+        let draw = |drawn: &mut Drawn, player: &mut Player<'_>, row: fn(&mut Player<'_>, u32, &mut [u16])| {
             let start = Instant::now();
             let picture = play::rows(player, row);
             drawn.time += start.elapsed();
