@@ -4,7 +4,7 @@
 
 use cubist_core::checksum;
 use cubist_core::format::{
-    ATLAS, Atlas, Envelope, KeyEntry, LABELS, LabelRecord, Limits, MAGIC, PATH, Path, Section, TIME_LINEAR, VERSION,
+    ATLAS, Atlas, Envelope, KeyEntry, LABELS, LabelRecord, Limits, MAGIC, PATH, Path, SPACE_CUBIC, Section, TIME_LINEAR, VERSION,
 };
 
 /// Width, height, frames and frames per second of [`bundle`].
@@ -29,9 +29,13 @@ pub fn bundle() -> Vec<u8> {
         looping: false,
         cell_log2: 3,
         time: TIME_LINEAR,
+        space: SPACE_CUBIC,
+        key_bits: 6,
         step_log2: 0,
         limits: Limits { key_layers: 2000, row_layers: 400, list_bytes: 2000, row_sheets: 80, cell_sheets: 4, fields: 0, seek_keys: 4 },
         table: &table,
+        planes: &[],
+        cameras: &[],
         records: &records,
     };
     let path = postcard::to_stdvec(&path).expect("a path is plain data");
