@@ -309,7 +309,8 @@ mod tests {
         };
         for _ in 0..2000 {
             let parts: [[u16; 3]; 4] = core::array::from_fn(|_| [next(32), next(64), next(32)]);
-            let [r, g, b] = [0, 1, 2].map(|part: usize| (parts.iter().map(|p| p[part]).sum::<u16>() + 2) >> 2);
+            let part = |get: fn([u16; 3]) -> u16| (parts.map(get).iter().sum::<u16>() + 2) >> 2;
+            let [r, g, b] = [part(|[r, _, _]| r), part(|[_, g, _]| g), part(|[_, _, b]| b)];
             assert_eq!(mean(parts.map(|[r, g, b]| colour(r, g, b))), colour(r, g, b));
         }
         assert_eq!(mean([u16::MAX; 4]), u16::MAX);

@@ -532,11 +532,10 @@ mod tests {
         for bits in KEY_BITS.map(u32::from) {
             let at = |u: i32, v: i32| KeyUv::new(u, v);
             let (far, scale) = ([at(KEY_MIN, KEY_MAX), at(1, 2), at(KEY_MAX, KEY_MIN), at(-3, 4)], PLAY_BITS - bits);
-            for key in 0..4 {
-                let mut weights = [0; 4];
-                weights[key] = ONE;
+            let alone = [[ONE, 0, 0, 0], [0, ONE, 0, 0], [0, 0, ONE, 0], [0, 0, 0, ONE]];
+            for (weights, key) in alone.into_iter().zip(far) {
                 let Layer { u, v } = blend(far, weights, bits);
-                assert_eq!([u, v], [far[key].u() << scale, far[key].v() << scale]);
+                assert_eq!([u, v], [key.u() << scale, key.v() << scale]);
             }
             let Layer { u, v } = blend([at(1234, -77); 4], [-700, ONE - 300, 1700, -700], bits);
             assert_eq!([u, v], [1234 << scale, -(77 << scale)]);
