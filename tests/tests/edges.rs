@@ -39,9 +39,11 @@ fn check(scene: &Scene, settings: &Settings) -> (Vec<u8>, Quality) {
     (encoded.bundle.clone(), quality)
 }
 
-/// A key a frame, every sheet kept: what is left is what cells of 8 pixels cannot follow.
+/// A key a frame, every sheet and every residual kept: what is left is what cells of 8 pixels cannot follow.
 fn dense() -> Settings {
-    Settings { key_interval: 1, least_pixels: 1, ..Settings::default() }
+    let mut settings = Settings { key_interval: 1, least_pixels: 1, ..Settings::default() };
+    settings.coding.lambda = 0.0;
+    settings
 }
 
 #[test]
@@ -94,8 +96,8 @@ fn a_camera_that_stands_still_shows_one_picture() {
     let frames = play::frames(&still, 0..20).expect("it plays");
     let different = |picture: &[u16]| picture.iter().zip(&frames[0]).filter(|(a, b)| a != b).count();
     let most = frames.iter().map(|picture| different(picture)).max().unwrap_or(0);
-    // Nothing moves: at most a few pixels at edges where ghosts were rounded differently from key to key.
-    assert!(most * 200 <= frames[0].len(), "{most} of {} pixels change", frames[0].len());
+    // Nothing moves: at most a few pixels between texels where residuals were weighed against bits differently from key to key.
+    assert!(most * 100 <= frames[0].len(), "{most} of {} pixels change", frames[0].len());
     // And what comes after the first key costs next to nothing.
     let bundle = Bundle::parse(&still).expect("the baker's bytes parse");
     let (first, second) = (bundle.record(0).len(), bundle.record(1).len());
