@@ -40,11 +40,13 @@
 //!
 //! # How a pixel comes about
 //!
-//! 1. **Time** ([`timeline`]). Every layer of the two rows of nodes around a row of cells is interpolated between the
+//! 1. **Time** ([`timeline`]). Every layer of the rows of nodes around a row of cells is interpolated between the
 //!    interval's two keys: held, straight, or along a Catmull-Rom curve that takes the key before and the one after into account
 //!    where these carry the layer too.
-//! 2. **Space.** Inside a cell each sheet's position is bilinear between its four corners. Along a row of pixels that is one
-//!    addition a pixel.
+//! 2. **Space.** Where space is *linear*, each sheet's position is bilinear between its cell's four corners. Where it is *cubic*, the
+//!    middles of the cell's edges and its own are told first, each from four nodes in a row as far as these carry the layer
+//!    ([`fixed::middle`]), and positions are bilinear in each quarter: nearly as good as cells half as large, at no bytes. Along a row of
+//!    pixels either is one addition a pixel.
 //! 3. **Coverage.** In a torn cell the frontmost sheet that covers a pixel shows; the last covers whatever is left. A sheet covers
 //!    a pixel by one of three tests, which its list names. The *chart* test: its position lies inside its label's rectangle, and in
 //!    the mask if the chart does not fill that. The *field* test, for outlines that no chart has, such as a cone's silhouette: a
@@ -58,8 +60,8 @@
 //!
 //! # How keys are read
 //!
-//! A key's **record** ([`record`]) is told from the one or two keys before it ([`coder`], [`nodes`]). An *independent* key is
-//! told from nothing; decoding starts there. Decoded keys live in a ring in the caller's memory: those that the interval needs (for
+//! A key's **record** ([`record`]) is told from the one or two keys before it ([`coder`], [`nodes`]), and from where its camera sees the
+//! planes that flat labels lie in ([`plane`]). An *independent* key is told from no other; decoding starts there. Decoded keys live in a ring in the caller's memory: those that the interval needs (for
 //! cubic time the one before it, its two ends and the one after, else its two ends), and the next one, which is decoded while the
 //! interval plays: every frame does its share of it, some **slices**, so that none pays for a whole key. The sheet lists of the
 //! intervals that start at them are in another ring. In playback the next key is complete when it is needed, and the one after it takes
