@@ -55,7 +55,7 @@
 //!    layers carry two fields, the distances from either side, and both have to be above zero.
 //! 4. **Colour.** One texel, one palette entry.
 //!
-//! No triangles, no depth, no division by it: perspective is in the keys. What a frame costs follows from the screen and the
+//! No triangles, no depth, and no division for a pixel: perspective is in the keys. What a frame costs follows from the screen and the
 //! bundle's [`format::Limits`], not from how many triangles the scene had.
 //!
 //! # How keys are read
