@@ -7,6 +7,7 @@ pub mod figures;
 pub mod golden;
 pub mod partitions;
 pub mod play;
+pub mod random;
 pub mod reference;
 pub mod scenes;
 pub mod tables;

@@ -31,13 +31,9 @@ pub fn probes(player: &mut Player<'_>) -> Vec<Probe> {
     whole(player, |player, y, out| player.probe_row(y, out))
 }
 
-/// The current frame of `player`, row by row, drawn by `row`.
+/// The current frame of `player`, row by row as `row` draws it.
 #[must_use]
-pub fn rows(player: &mut Player<'_>, row: fn(&mut Player<'_>, u32, &mut [u16])) -> Vec<u16> {
-    whole(player, row)
-}
-
-fn whole<T: Clone + Default>(player: &mut Player<'_>, row: impl Fn(&mut Player<'_>, u32, &mut [T])) -> Vec<T> {
+pub fn whole<T: Clone + Default>(player: &mut Player<'_>, row: impl Fn(&mut Player<'_>, u32, &mut [T])) -> Vec<T> {
     let (width, height) = player.bundle().size();
     let mut picture = vec![T::default(); (width * height) as usize];
     for (y, out) in (0..).zip(picture.chunks_mut(width as usize)) {

@@ -11,6 +11,7 @@ use cubist_core::grid::Grid;
 use cubist_core::lists::{self, BOTH, CHART, FIELD, Lists, Sheets, SheetsRef};
 use cubist_core::plane::{CAMERA_BYTES, Camera, PLANE_BYTES, Plane, Vector};
 use cubist_core::{Bundle, BundleError, Frame, MemoryError, Player, checksum};
+use cubist_tests::random::{EDGES, Random};
 use cubist_tests::scenes;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -137,19 +138,6 @@ fn every_changed_byte_is_refused_by_the_checksum() {
     }
 }
 
-/// A small generator (splitmix64): the same changes in every run.
-struct Random(u64);
-
-impl Random {
-    fn below(&mut self, end: usize) -> usize {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut x = self.0;
-        x = (x ^ x >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        x = (x ^ x >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((x ^ x >> 31) % end as u64) as usize
-    }
-}
-
 /// Changes one to eight bytes of `bytes` within `range`.
 fn mutate(bytes: &mut [u8], range: std::ops::Range<usize>, random: &mut Random) {
     let values = [0, 1, 0x7f, 0x80, 0xff];
@@ -259,10 +247,6 @@ fn with_vectors(vectors: &mut dyn FnMut() -> Vector, shifts: &mut dyn FnMut() ->
     let cameras = (0..keys).map(camera).collect::<Vec<_>>().concat();
     with_path(|path| (path.planes, path.cameras) = (&planes, &cameras))
 }
-
-/// Numbers at which sums, products and shifts go wrong.
-const EDGES: [i32; 12] =
-    [i32::MIN, i32::MIN + 1, -(1 << 27) - 1, -(1 << 24), -1, 0, 1, 1 << 12, 1 << 24, (1 << 27) + 1, i32::MAX - 1, i32::MAX];
 
 #[test]
 fn planes_and_cameras_of_any_numbers_play() {

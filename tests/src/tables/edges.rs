@@ -42,7 +42,7 @@ pub fn measure(scene: &Scene) -> Result<Value> {
         let exact = truth.frame(frame);
         let draw = |drawn: &mut Drawn, player: &mut Player<'_>, row: fn(&mut Player<'_>, u32, &mut [u16])| {
             let start = Instant::now();
-            let picture = play::rows(player, row);
+            let picture = play::whole(player, row);
             drawn.time += start.elapsed();
             let played: Vec<u8> = picture.into_iter().flat_map(rgb).collect();
             drawn.psnr += metrics::psnr(metrics::mean_squared_error(&played, &exact));
