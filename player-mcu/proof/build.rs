@@ -1,12 +1,9 @@
-//! Hands `memory.x` to the linker, by way of cortex-m-rt's `link.x`.
+//! Hands `memory.x` to the linker.
 
-use std::path::PathBuf;
+#[path = "../link.rs"]
+mod link;
 
 fn main() -> std::io::Result<()> {
-    let out = PathBuf::from(std::env::var_os("OUT_DIR").unwrap_or_default());
-    std::fs::copy("memory.x", out.join("memory.x"))?;
-    println!("cargo:rustc-link-search={}", out.display());
-    println!("cargo:rustc-link-arg-bins=-Tlink.x");
-    println!("cargo:rerun-if-changed=memory.x");
+    link::memory()?;
     Ok(())
 }

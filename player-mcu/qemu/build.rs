@@ -1,14 +1,13 @@
-//! Hands `memory.x` to the linker, by way of cortex-m-rt's `link.x`, and the bundle that CUBIST_BUNDLE names to the compiler:
-//! it is linked in, as it would lie in flash.
+//! Hands `memory.x` to the linker, and the bundle that CUBIST_BUNDLE names to the compiler: it is linked in, as it would lie in flash.
+
+#[path = "../link.rs"]
+mod link;
 
 use std::path::PathBuf;
 
 fn main() -> std::io::Result<()> {
-    let out = PathBuf::from(std::env::var_os("OUT_DIR").unwrap_or_default());
-    std::fs::copy("memory.x", out.join("memory.x"))?;
-    println!("cargo:rustc-link-search={}", out.display());
+    let out = link::memory()?;
     println!("cargo:rustc-link-arg-bins=-Tlink.x");
-    println!("cargo:rerun-if-changed=memory.x");
     println!("cargo:rerun-if-env-changed=CUBIST_BUNDLE");
     // Without a bundle the firmware builds all the same, and says what is wrong when it runs.
     let bundle = match std::env::var_os("CUBIST_BUNDLE") {
