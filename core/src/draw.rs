@@ -28,20 +28,27 @@ pub trait Paint {
 
 /// Colours, by way of the source image.
 #[derive(Debug)]
-pub struct Colours<'t, F> {
+pub struct Colours<'t> {
     /// The source image.
     pub texture: Texture<'t>,
-    /// A texel's colour.
-    pub colour: F,
+    /// The colours of its texels.
+    pub palette: &'t [u16; 256],
 }
 
-impl<F: Fn(u8) -> u16> Paint for Colours<'_, F> {
+impl Colours<'_> {
+    #[inline(always)]
+    fn colour(&self, texel: u8) -> u16 {
+        self.palette.get(usize::from(texel)).copied().unwrap_or(0)
+    }
+}
+
+impl Paint for Colours<'_> {
     type Pixel = u16;
     const OFTEN: bool = true;
 
     #[inline(always)]
     fn at(&self, uv: PlayUv, _: u8) -> u16 {
-        (self.colour)(self.texture.texel(uv))
+        self.colour(self.texture.texel(uv))
     }
 
     // A function of its own: the loop needs all registers.
@@ -50,7 +57,7 @@ impl<F: Fn(u8) -> u16> Paint for Colours<'_, F> {
         let from = usize::from(run.row).wrapping_shl(WIDTH);
         // The plan keeps windows inside the picture.
         let Some(window) = self.texture.texels.get(from..).and_then(<[u8]>::first_chunk::<TEXELS>) else { return };
-        let make = |at: Packed<WIDTH, ROWS>| (self.colour)(window.get(at.texel()).copied().unwrap_or(0));
+        let make = |at: Packed<WIDTH, ROWS>| self.colour(window.get(at.texel()).copied().unwrap_or(0));
         // Blocks of four in a picture 512 wide are the rule, and have a loop of their own.
         if (WIDTH, log2) == (9, 2) {
             span::run::<_, WIDTH, ROWS, 4>(edges, out, make);
@@ -99,6 +106,18 @@ impl<'d, 'a> Drawing<'d, 'a> {
     /// Draws pixel row `y`, which lies in the row of cells.
     #[inline(always)]
     pub fn row<P: Paint>(&mut self, y: u32, out: &mut [P::Pixel], work: &mut Work, paint: &P) {
+        let out = self.runs(y, out, work, paint);
+        // Quarters of cells of eight pixels are the rule; with numbers that are known the code is a third shorter to run.
+        if P::OFTEN && (self.site.log2(), self.site.bundle.grid().log2) == (2, 3) {
+            mix::<P, true>(&self.site, self.mixed(), y, out, paint);
+        } else {
+            mix::<P, false>(&self.site, self.mixed(), y, out, paint);
+        }
+    }
+
+    /// Draws the runs of pixel row `y`. What there is of `out` on the screen comes back: its mixed blocks are still to be drawn.
+    #[inline(always)]
+    fn runs<'o, P: Paint>(&mut self, y: u32, out: &'o mut [P::Pixel], work: &mut Work, paint: &P) -> &'o mut [P::Pixel] {
         let log2 = self.site.log2();
         let (strip, row) = (y >> log2, y & (1u32 << log2).wrapping_sub(1));
         if self.plan.strip != Some(strip) || self.plan.row > row {
@@ -108,7 +127,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
         let width = self.site.bundle.size().0 as usize;
         let drawn = out.len().min(width);
         let out = out.get_mut(..drawn).unwrap_or(&mut []);
-        let Plan { edge, run: runs, mixed, runs: count, mixes, .. } = &mut *self.plan;
+        let Plan { edge, run: runs, runs: count, .. } = &mut *self.plan;
         for &run in runs.get(..*count).unwrap_or(&[]) {
             let first = usize::from(run.edge);
             let Some(edges) = edge.get_mut(first..=first.wrapping_add(run.blocks.into())) else { continue };
@@ -119,32 +138,25 @@ impl<'d, 'a> Drawing<'d, 'a> {
                 None => cut(paint, run, edges, out, log2, self.site.bundle.texture().width_log2),
             }
         }
-        let mixed = mixed.get(..*mixes).unwrap_or(&[]);
-        // Quarters of cells of eight pixels are the rule; with numbers that are known the code is a third shorter to run.
-        if P::OFTEN && (log2, self.site.bundle.grid().log2) == (2, 3) {
-            mix::<P, true>(&self.site, mixed, y, out, paint);
-        } else {
-            mix::<P, false>(&self.site, mixed, y, out, paint);
-        }
         self.plan.row = row.wrapping_add(1);
         work.smooth_pixels = work.smooth_pixels.wrapping_add(self.plan.smooth);
         work.torn_pixels = work.torn_pixels.wrapping_add(self.plan.torn);
         work.coverage_tests = work.coverage_tests.wrapping_add(self.plan.tests);
+        out
     }
-}
 
-impl Drawing<'_, '_> {
-    /// Draws the mixed blocks of pixel row `y`, which was drawn last, once more: every pixel as `mean` has it of four, a quarter of a pixel
-    /// off its centre both ways.
-    pub fn smooth<P: Paint>(&self, y: u32, out: &mut [P::Pixel], work: &mut Work, paint: &P, mean: impl Fn([P::Pixel; 4]) -> P::Pixel) {
+    /// The strip's mixed blocks.
+    fn mixed(&self) -> &[Mixed] {
+        self.plan.mixed.get(..self.plan.mixes).unwrap_or(&[])
+    }
+
+    /// Draws pixel row `y` like [`Drawing::row`], but every pixel of a mixed block as `mean` has it of four, a quarter of a pixel off its
+    /// centre both ways.
+    pub fn smooth<P: Paint>(&mut self, y: u32, out: &mut [P::Pixel], work: &mut Work, paint: &P, mean: impl Fn([P::Pixel; 4]) -> P::Pixel) {
         let log2 = self.site.log2();
-        let width = self.site.bundle.size().0 as usize;
-        let drawn = out.len().min(width);
-        let out = out.get_mut(..drawn).unwrap_or(&mut []);
-        for mixed in self.plan.mixed.get(..self.plan.mixes).unwrap_or(&[]) {
-            let first = usize::from(mixed.block).wrapping_shl(log2);
-            let last = first.wrapping_add(1 << log2).min(out.len());
-            let Some(pixels) = out.get_mut(first..last) else { break };
+        let out = self.runs(y, out, work, paint);
+        for mixed in self.mixed() {
+            let Some(pixels) = mixed.pixels(out, log2) else { break };
             let mut samples = [[P::Pixel::default(); 32]; 4];
             for (samples, beside) in samples.iter_mut().zip([[-1, -1], [1, -1], [-1, 1], [1, 1]]) {
                 if let Some(samples) = samples.get_mut(..pixels.len()) {
@@ -158,6 +170,16 @@ impl Drawing<'_, '_> {
             }
             work.smoothed_pixels = work.smoothed_pixels.wrapping_add(pixels.len() as u32);
         }
+    }
+}
+
+impl Mixed {
+    /// The block's pixels in a row of them; `None` past its end.
+    #[inline(always)]
+    fn pixels<'o, T>(&self, row: &'o mut [T], log2: u32) -> Option<&'o mut [T]> {
+        let first = usize::from(self.block).wrapping_shl(log2);
+        let last = first.wrapping_add(1 << log2).min(row.len());
+        row.get_mut(first..last)
     }
 }
 
@@ -214,9 +236,7 @@ fn cut<P: Paint>(paint: &P, run: Run, edges: &mut [Edge], out: &mut [P::Pixel], 
 fn mix<P: Paint, const EIGHT: bool>(site: &Site<'_, '_, '_>, mixed: &[Mixed], y: u32, out: &mut [P::Pixel], paint: &P) {
     let log2 = if EIGHT { 2 } else { site.log2() };
     for mixed in mixed {
-        let first = usize::from(mixed.block).wrapping_shl(log2);
-        let last = first.wrapping_add(1 << log2).min(out.len());
-        let Some(pixels) = out.get_mut(first..last) else { break };
+        let Some(pixels) = mixed.pixels(out, log2) else { break };
         // The most frequent length has loops of its own.
         match <&mut [P::Pixel; 4]>::try_from(&mut *pixels) {
             Ok(four) if EIGHT => block::<P, EIGHT>(site, *mixed, y, four, paint, None),

@@ -140,7 +140,7 @@ impl LabelRecord {
 pub const TIME_HOLD: u8 = 0;
 /// Straight lines between neighbouring keys.
 pub const TIME_LINEAR: u8 = 1;
-/// Catmull-Rom curves through four keys, straight at a layer's first and last.
+/// Catmull-Rom curves through four keys, a parabola through three at a layer's first and last.
 pub const TIME_CUBIC: u8 = 2;
 
 /// How layers are interpolated between nodes: [`Path::space`].

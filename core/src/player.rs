@@ -221,36 +221,33 @@ impl<'a> Player<'a> {
     ///
     /// For each pixel at most one texel read for every sheet of its cell, and a coverage test for every one but the last: with
     /// [`Limits::row_sheets`] sheets in a row of cells, at most that times the cell's width of either. The first row of a row of
-    /// cells also interpolates the layers of two rows of nodes, or of one where the row of cells above was the last drawn: at most
-    /// [`Limits::row_layers`] each. Never allocates, never waits.
+    /// cells also interpolates the layers of two rows of nodes (where space is cubic of four, and works out what lies halfway between the
+    /// inner two), or of one where the row of cells above was the last drawn: at most [`Limits::row_layers`] each. Never allocates, never waits.
     pub fn row(&mut self, y: u32, out: &mut [u16]) {
-        if !self.ready(y) {
-            return;
+        if let Some((mut drawing, work, paint)) = self.colours(y) {
+            drawing.row(y, out, work, &paint);
         }
-        let texture = self.bundle.texture();
-        let (mut drawing, palette) = Drawing::new(self.bundle, &mut self.space);
-        let Ok(palette) = <&[u16; 256]>::try_from(palette) else { return };
-        let colour = |texel: u8| palette.get(usize::from(texel)).copied().unwrap_or(0);
-        drawing.row(y, out, &mut self.work, &Colours { texture, colour });
     }
 
     /// Like [`Player::row`], with antialiased outlines: where a block of pixels shows more than one sheet, every pixel is the mean of four,
-    /// a quarter of a pixel off its centre both ways. Such a block costs about five times as much as in `row`, all others the same.
+    /// a quarter of a pixel off its centre both ways. Such a block costs about four times as much as in `row`, all others the same.
     pub fn smooth_row(&mut self, y: u32, out: &mut [u16]) {
+        let swapped = self.swapped;
+        if let Some((mut drawing, work, paint)) = self.colours(y) {
+            let native = |colour: u16| if swapped { colour.swap_bytes() } else { colour };
+            drawing.smooth(y, out, work, &paint, |four| native(mean(four.map(native))));
+        }
+    }
+
+    /// What draws row `y` in colours, and counts; `None` below the screen.
+    #[inline(always)]
+    fn colours(&mut self, y: u32) -> Option<(Drawing<'_, 'a>, &mut Work, Colours<'_>)> {
         if !self.ready(y) {
-            return;
+            return None;
         }
         let texture = self.bundle.texture();
-        let (mut drawing, palette) = Drawing::new(self.bundle, &mut self.space);
-        let Ok(palette) = <&[u16; 256]>::try_from(palette) else { return };
-        let colour = |texel: u8| palette.get(usize::from(texel)).copied().unwrap_or(0);
-        let paint = Colours { texture, colour };
-        drawing.row(y, out, &mut self.work, &paint);
-        if self.swapped {
-            drawing.smooth(y, out, &mut self.work, &paint, |four| mean(four.map(u16::swap_bytes)).swap_bytes());
-        } else {
-            drawing.smooth(y, out, &mut self.work, &paint, mean);
-        }
+        let (drawing, palette) = Drawing::new(self.bundle, &mut self.space);
+        Some((drawing, &mut self.work, Colours { texture, palette: palette.try_into().ok()? }))
     }
 
     /// Like [`Player::row`], but says where each pixel comes from instead of its colour.

@@ -85,7 +85,7 @@ pub struct Render {
     /// Every pixel becomes a square of N x N.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=16))]
     pub scale: u32,
-    /// Antialiases outlines: four samples a pixel where surfaces meet, as the player's `smooth_row` does; such pixels take five times as long.
+    /// Antialiases outlines: four samples a pixel where surfaces meet, as the player's `smooth_row` does; such pixels take four times as long.
     #[arg(long)]
     pub smooth: bool,
 }

@@ -4,7 +4,7 @@
 use cubist_baker::bake::Settings;
 use cubist_baker::camera::{Path, Pose};
 use cubist_baker::scene::{Background, Scene, Texture, Wrap};
-use cubist_core::Bundle;
+use cubist_core::{Bundle, ByteOrder};
 use cubist_tests::figures::{self, Quality};
 use cubist_tests::{play, scenes};
 use glam::DVec3;
@@ -102,6 +102,24 @@ fn a_camera_that_stands_still_shows_one_picture() {
     let bundle = Bundle::parse(&still).expect("the baker's bytes parse");
     let (first, second) = (bundle.record(0).len(), bundle.record(1).len());
     assert!(second * 4 < first, "{first} bytes, then {second}");
+}
+
+#[test]
+fn antialiased_outlines_are_means_and_nothing_else_changes() {
+    let bytes = scenes::bundle("street", [96, 64], 3, &Settings::default()).expect("a built-in scene bakes");
+    play::visit(&bytes, [1], |_, player| {
+        let plain = play::pixels(player);
+        let before = player.work().smoothed_pixels;
+        let smooth = play::whole(player, |player, y, out| player.smooth_row(y, out));
+        let smoothed = (player.work().smoothed_pixels - before) as usize;
+        let changed = plain.iter().zip(&smooth).filter(|(a, b)| a != b).count();
+        assert!(changed > 50 && changed <= smoothed && smoothed * 2 < plain.len(), "{changed} of {smoothed} of {}", plain.len());
+        // In the other byte order the same colours are mixed.
+        player.set_byte_order(if cfg!(target_endian = "big") { ByteOrder::LittleEndian } else { ByteOrder::BigEndian });
+        let swapped = play::whole(player, |player, y, out| player.smooth_row(y, out));
+        assert!(swapped.into_iter().map(u16::swap_bytes).eq(smooth));
+    })
+    .expect("it plays");
 }
 
 /// A camera that looks away from everything.
