@@ -220,17 +220,8 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     progress("coding keys", 0.8);
     let header = encode::Header { fps: scene.playback.fps, info: &scene.name };
     let (planes, cameras) = planes::records(&charts, &layers.by_label(image.labels.len()), &lenses, &grid);
-    let content = Content {
-        gbuffer,
-        grid: &grid,
-        image,
-        sheets: &sheets,
-        layers: &layers,
-        fit: &fit,
-        fields: &fields,
-        planes: &planes,
-        cameras: &cameras,
-    };
+    let content =
+        Content { grid: &grid, image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields, planes: &planes, cameras: &cameras };
     let bundle = encode::bundle(&content, settings.coding, header)?;
     progress("coding keys", 1.0);
     Ok(Encoded { bundle, grid, dropped_pixels: sheets.dropped, seconds: start.elapsed().as_secs_f64() })

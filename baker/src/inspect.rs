@@ -211,12 +211,8 @@ impl Inspection {
                 looping: bundle.looping(),
                 cell,
                 cells: [width.div_ceil(cell), height.div_ceil(cell)],
-                time: match path.time {
-                    TIME_HOLD => "hold",
-                    TIME_LINEAR => "linear",
-                    _ => "cubic",
-                },
-                space: if path.space == SPACE_LINEAR { "linear" } else { "cubic" },
+                time: time_name(path.time),
+                space: space_name(path.space),
                 steps_a_texel: (1 << path.key_bits) >> path.step_log2,
                 table_bytes: path.table.len(),
                 plane_bytes: path.planes.len(),
@@ -359,6 +355,20 @@ impl Inspection {
 fn hex(colour: u16) -> String {
     let [r, g, b] = crate::verify::rgb(colour);
     format!("#{r:02x}{g:02x}{b:02x}")
+}
+
+/// What `--time` calls one of the format's `TIME_` numbers.
+pub(crate) const fn time_name(time: u8) -> &'static str {
+    match time {
+        TIME_HOLD => "hold",
+        TIME_LINEAR => "linear",
+        _ => "cubic",
+    }
+}
+
+/// What `--space` calls one of the format's `SPACE_` numbers.
+pub(crate) const fn space_name(space: u8) -> &'static str {
+    if space == SPACE_LINEAR { "linear" } else { "cubic" }
 }
 
 fn label_info(bundle: &Bundle<'_>, label: u8) -> LabelInfo {

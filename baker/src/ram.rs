@@ -5,11 +5,12 @@
 //! straight, and fewer layers in either where cells are larger. What each of these loses differs from scene to scene: it is measured.
 
 use crate::bake::{BakeError, Encoded, Flat, Settings};
+use crate::inspect::{space_name, time_name};
 use crate::job::Chosen;
 use crate::report::grouped;
 use crate::tune::{Search, possible};
 use crate::verify;
-use cubist_core::format::{Envelope, PATH, Path, SPACE_CUBIC, SPACE_LINEAR, TIME_HOLD, TIME_LINEAR};
+use cubist_core::format::{Envelope, PATH, Path, SPACE_LINEAR, TIME_LINEAR};
 use cubist_core::{Bundle, checksum};
 
 /// Cells tried, pixels, from the one asked for on.
@@ -162,12 +163,6 @@ fn memory_as(bundle: &[u8], time: u8, space: u8) -> Option<usize> {
 /// What the user should know: how `tried` differs from what was `asked` for, and what that costs. `whole`: memory and PSNR, dB, of that.
 fn gave_up(room: usize, asked: &Settings, whole: Option<(usize, f64)>, tried: &Tried, psnr: f64) -> String {
     let Settings { time, space, cell, key_interval, .. } = tried.settings;
-    let time_name = |time| match time {
-        TIME_HOLD => "hold",
-        TIME_LINEAR => "linear",
-        _ => "cubic",
-    };
-    let space_name = |space| if space == SPACE_CUBIC { "cubic" } else { "linear" };
     let changes = [
         (time != asked.time).then(|| format!("--time {} instead of {}", time_name(time), time_name(asked.time))),
         (space != asked.space).then(|| format!("--space {} instead of {}", space_name(space), space_name(asked.space))),
@@ -190,7 +185,7 @@ mod tests {
     use crate::job::{Goal, Options, TruthFrames, bake_scene};
     use crate::report::Report;
     use crate::scene::{Scene, builtin};
-    use cubist_core::format::TIME_CUBIC;
+    use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC};
 
     fn small() -> Scene {
         let mut scene = builtin::build("cone-orbit").unwrap();

@@ -35,29 +35,32 @@ pub fn place(gbuffer: &GBuffer, grid: &KeyGrid) -> Option<Vec<u32>> {
     // Keys stand where the sum of densities passes equal parts.
     let total: f64 = frames.iter().zip(&densities).map(|(frames, density)| frames * density).sum();
     // The ends of a path ask for a key more.
-    let wanted = intervals + usize::from(!grid.looping);
+    let more = usize::from(!grid.looping);
+    let (wanted, count) = (intervals + more, grid.keys.len() + more);
     let mut keys = vec![0u32];
     let (mut passed, mut frame) = (0.0, 0.0);
     for (length, density) in frames.iter().zip(&densities) {
         let next = passed + length * density;
-        while keys.len() < grid.keys.len() + wanted - intervals && keys.len() as f64 / wanted as f64 * total <= next + 1e-9 {
+        while keys.len() < count && keys.len() as f64 / wanted as f64 * total <= next + 1e-9 {
             let part = keys.len() as f64 / wanted as f64 * total - passed;
             let stands = libm::round(frame + part / density) as u32;
             keys.push(stands.max(keys[keys.len() - 1] + 1));
         }
         (passed, frame) = (next, frame + length);
     }
+    if keys.len() != count {
+        return None;
+    }
+    // A loop ends with an interval back to the first key, another path with a key at its last frame.
     let end = if grid.looping { grid.frames } else { grid.frames - 1 };
-    let beyond = if grid.looping { keys.last().is_some_and(|&key| key >= end) } else { false };
-    if keys.len() != grid.keys.len() + wanted - intervals || beyond {
+    if !grid.looping {
+        keys.pop();
+    }
+    if keys.last().is_some_and(|&key| key >= end) {
         return None;
     }
     if !grid.looping {
-        let count = keys.len();
-        keys[count - 1] = end;
-        if keys[count - 2] >= end {
-            return None;
-        }
+        keys.push(end);
     }
     // Even intervals are cheaper to play where the others gain nothing.
     let even = keys.iter().zip(&grid.keys).all(|(a, b)| a.abs_diff(*b) <= 1);

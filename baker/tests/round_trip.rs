@@ -58,8 +58,7 @@ fn bake_every(interval: u32, gbuffer: &GBuffer, image: &SourceImage, looping: bo
     evidence.fields = Some(&fields);
     order::sort(&evidence, &mut sheets);
     let settings = CodingSettings { step_log2: 0, lambda: 0.0, independent_every };
-    let content =
-        Content { gbuffer, grid: &grid, image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields, planes: &[], cameras: &[] };
+    let content = Content { grid: &grid, image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields, planes: &[], cameras: &[] };
     encode::bundle(&content, settings, Header { fps: 30, info: "two sheets" }).expect("it fits")
 }
 
@@ -149,17 +148,8 @@ fn more_layers_than_a_key_can_have_are_an_error_with_a_cure() {
     let fit = fit::Fit { uv: vec![[0.5; 2]; count], weight: vec![1.0; count] };
     let fields = fields::Fields { distance: vec![[0.0; 2]; count], strip: vec![false; image.labels.len()] };
     let settings = CodingSettings { step_log2: 0, lambda: 0.0, independent_every: 1 };
-    let content = Content {
-        gbuffer: &gbuffer,
-        grid: &grid,
-        image: &image,
-        sheets: &sheets,
-        layers: &layers,
-        fit: &fit,
-        fields: &fields,
-        planes: &[],
-        cameras: &[],
-    };
+    let content =
+        Content { grid: &grid, image: &image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields, planes: &[], cameras: &[] };
     let error = encode::bundle(&content, settings, Header { fps: 30, info: "" }).expect_err("more than 16 bits can say");
     assert!(matches!(error, Exceeded { what: "layers in a key", found: 66_049, most: 65_535, .. }), "{error:?}");
     assert!(error.to_string().contains("--cell"), "{error}");

@@ -7,7 +7,6 @@ mod range;
 use crate::atlas::SourceImage;
 use crate::fields::Fields;
 use crate::fit::Fit;
-use crate::gbuffer::GBuffer;
 use crate::sheets::{KeyGrid, Layers, Sheets};
 use cubist_core::coder::Probability;
 use cubist_core::fixed::{KEY_MAX, KEY_MIN, field_code};
@@ -46,8 +45,6 @@ pub struct Header<'a> {
 /// Everything that becomes a bundle.
 #[derive(Clone, Copy)]
 pub struct Content<'a> {
-    /// What is really seen.
-    pub gbuffer: &'a GBuffer,
     /// The key-ray grid.
     pub grid: &'a KeyGrid,
     /// The source image.
@@ -71,7 +68,7 @@ pub struct Content<'a> {
 /// # Errors
 /// [`Exceeded`] where a key or an interval holds more than the bundle's bounds can say.
 pub fn bundle(content: &Content<'_>, settings: CodingSettings, header: Header<'_>) -> Result<Vec<u8>, Exceeded> {
-    let &Content { gbuffer, grid, image, .. } = content;
+    let &Content { grid, image, .. } = content;
     let key_bits = key_bits(image);
     let mut labels: Vec<LabelRecord> = image.labels.iter().map(|label| label_record(label, key_bits)).collect();
     for (record, &strip) in labels.iter_mut().zip(&content.fields.strip) {
@@ -82,9 +79,9 @@ pub fn bundle(content: &Content<'_>, settings: CodingSettings, header: Header<'_
     let cameras: Vec<[u8; CAMERA_BYTES]> = content.cameras.iter().map(Camera::to_bytes).collect();
     let (table, records) = keys(content, &labels, &planes, settings, bounds);
     let path = Path {
-        width: gbuffer.width as u16,
-        height: gbuffer.height as u16,
-        frames: gbuffer.frames,
+        width: grid.size[0] as u16,
+        height: grid.size[1] as u16,
+        frames: grid.frames,
         fps: header.fps,
         looping: grid.looping,
         cell_log2: grid.grid.log2 as u8,
@@ -264,14 +261,13 @@ impl Source for Wanted<'_> {
         let Some(layer) = self.content.layers.find(self.key * self.content.grid.grid.nodes() + node, label) else { return [0, 0] };
         let unit = (1u32 << key_bits(self.content.image)) as f32;
         let step = (1u32 << self.settings.step_log2) as f32 / unit;
-        let free = self.settings.lambda > 0.0;
         let mut residual = [0, 0];
         for axis in 0..2 {
             let wanted = self.content.fit.uv[layer][axis].clamp(KEY_MIN as f32 / unit, KEY_MAX as f32 / unit);
             let exact = (wanted - predicted[axis] as f32 / unit) / step;
             let nearest = libm::roundf(exact) as i32;
             residual[axis] = nearest;
-            if !free || nearest == 0 {
+            if self.settings.lambda <= 0.0 || nearest == 0 {
                 continue;
             }
             // What the exact value gains the pixels that look at the layer is weighed against its bits; ghosts have few such pixels.
