@@ -7,7 +7,6 @@ use std::path::PathBuf;
 
 fn main() -> std::io::Result<()> {
     let out = link::memory()?;
-    println!("cargo:rustc-link-arg-bins=-Tlink.x");
     println!("cargo:rerun-if-env-changed=CUBIST_BUNDLE");
     // Without a bundle the firmware builds all the same, and says what is wrong when it runs.
     let bundle = match std::env::var_os("CUBIST_BUNDLE") {
