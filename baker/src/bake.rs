@@ -10,7 +10,7 @@ use crate::scene::Scene;
 use crate::sheets::{self, KeyGrid, Layers};
 use crate::trace::Tracer;
 use crate::verify::VerifyError;
-use crate::{fields, fit, order, tears, timing};
+use crate::{fields, fit, order, polish, tears, timing};
 use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC};
 use std::time::Instant;
 use thiserror::Error;
@@ -217,6 +217,8 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let fields = fields::solve(gbuffer, &grid, &sheets, &layers, image.labels.len());
     evidence.fields = Some(&fields);
     order::sort(&evidence, &mut sheets);
+    let fields = fields.settled(gbuffer, &grid, &sheets, &layers);
+    let fields = polish::polish(fields, gbuffer, &grid, &sheets, &layers);
     progress("coding keys", 0.8);
     let header = encode::Header { fps: scene.playback.fps, info: &scene.name };
     let (planes, cameras) = planes::records(&charts, &layers.by_label(image.labels.len()), &lenses, &grid);

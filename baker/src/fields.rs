@@ -9,6 +9,7 @@ use crate::gbuffer::GBuffer;
 use crate::sheets::{KeyGrid, Layers, Sheets};
 use cubist_core::fixed::{field_code, field_distance};
 use cubist_core::format::{SPACE_LINEAR, TIME_LINEAR};
+use cubist_core::lists::CHART;
 use rayon::prelude::*;
 
 /// Distances are told apart up to this many cells.
@@ -17,6 +18,17 @@ const REACH: f32 = 1.5;
 const THIN: usize = 3;
 /// How fast a pixel's say falls with its distance from the outline, pixels: the outline has to be right, not the middle.
 const FALLOFF: f32 = 0.6;
+
+/// Refits after the first fit of distances, and again once the tests are chosen.
+const REFITS: usize = 2;
+/// How far on its side of the outline a pixel has to be to be left alone by a refit, pixels.
+const CONTENT: f32 = 0.4;
+/// What such a pixel still weighs, of its weight: the outline is to move no more than others need.
+const CALM: f32 = 0.05;
+/// The least weight of a pixel that is not.
+const URGENT: f32 = 0.25;
+/// A pixel farther than this on the wrong side, pixels, is given up: no outline of this shape reaches it.
+const LOST: f32 = 3.0;
 
 /// The fields of all layers.
 #[derive(Clone, Debug)]
@@ -31,13 +43,64 @@ pub struct Fields {
 /// `None` where there is none within reach.
 type Distances = [Option<f32>; 4];
 
-/// Fits the fields of all layers, given the sheets front to back.
+/// Fits the fields of all layers, given the sheets front to back: what `order` chooses the tests by.
 #[must_use]
 pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers, labels: usize) -> Fields {
     let thin = thin_labels(gbuffer, grid, sheets, labels);
-    let reach = REACH * (1u32 << grid.grid.log2) as f32;
-    let target = |index: usize, sheet: usize, pixel: usize| {
-        let list = &sheets.lists[index];
+    let outlines = Outlines { gbuffer, grid, sheets, layers, thin: &thin };
+    let first = fit::solve_for(&outlines.problem(None, |index, sheet, pixel| outlines.target(index, sheet, pixel))).uv;
+    let distance = outlines.refit(first, false);
+    Fields { distance, strip: thin.iter().map(|&thin| thin != Thin::No).collect() }
+}
+
+impl Fields {
+    /// Fits the fields once more, now that the tests are chosen: where charts tell, fields need not.
+    #[must_use]
+    pub fn settled(self, gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers) -> Self {
+        let thin = thin_labels(gbuffer, grid, sheets, self.strip.len());
+        let outlines = Outlines { gbuffer, grid, sheets, layers, thin: &thin };
+        Self { distance: outlines.refit(self.distance, true), ..self }
+    }
+}
+
+/// Whether the sheet at a place in the list of a cell and interval is told by its fields.
+pub(crate) fn tests_field(sheets: &Sheets, index: usize, sheet: usize) -> bool {
+    // The last sheet passes without a test: there are no bits for the ninth.
+    sheet + 1 < sheets.lists[index].len() && sheets.tests[index] >> (2 * sheet) & 3 != CHART
+}
+
+/// What fields are fitted to.
+struct Outlines<'a> {
+    gbuffer: &'a GBuffer,
+    grid: &'a KeyGrid,
+    sheets: &'a Sheets,
+    layers: &'a Layers,
+    thin: &'a [Thin],
+}
+
+impl<'a> Outlines<'a> {
+    fn problem<T>(&self, known: Option<&'a [[f32; 2]]>, target: T) -> Problem<'a, T> {
+        let &Outlines { grid, sheets, layers, .. } = self;
+        Problem { grid, sheets, layers, time: TIME_LINEAR, space: SPACE_LINEAR, prior: None, known, refit: hinge, target }
+    }
+
+    /// `fields` after a few refits, to those sheets only that are tested or to all, as the player will have them.
+    fn refit(&self, mut fields: Vec<[f32; 2]>, tested: bool) -> Vec<[f32; 2]> {
+        let target = |index: usize, sheet: usize, pixel: usize| {
+            let wanted = !tested || tests_field(self.sheets, index, sheet);
+            if wanted { self.target(index, sheet, pixel) } else { None }
+        };
+        for _ in 0..REFITS {
+            fields = fit::solve_for(&Outlines { ..*self }.problem(Some(&fields), target)).uv;
+        }
+        let stored = |distance: f32| field_distance(field_code(libm::roundf(distance * 256.0) as i32)) as f32 / 256.0;
+        fields.iter().map(|pair| pair.map(stored)).collect()
+    }
+
+    /// The target and weight of a pixel for the sheet at a place in the list of its cell and interval.
+    fn target(&self, index: usize, sheet: usize, pixel: usize) -> Option<([f32; 2], f32)> {
+        let &Outlines { gbuffer, grid, .. } = self;
+        let list = &self.sheets.lists[index];
         if list.len() < 2 {
             return None;
         }
@@ -47,19 +110,26 @@ pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers
             return None;
         }
         let inside = seen == Some(sheet);
+        let reach = REACH * (1u32 << grid.grid.log2) as f32;
         let look = Look { gbuffer, grid, front: &list[..sheet], label: list[sheet], reach: reach as usize };
         let distances = look.around(pixel, inside);
-        match thin[usize::from(list[sheet])] {
+        match self.thin[usize::from(list[sheet])] {
             Thin::No => Some(signed(distances, inside, reach)),
             Thin::Across => strip(distances[0], distances[1], inside, reach),
             Thin::Down => strip(distances[2], distances[3], inside, reach),
         }
+    }
+}
+
+/// What a refit asks of a pixel, given the fields it has and should have: only their signs count, so a pixel that is well on its side may
+/// stay where it is, and one that is not is to get there. (A squared hinge loss, minimised by Newton steps: Keerthi, DeCoste 2005.)
+fn hinge(known: [f32; 2], target: [f32; 2], weight: f32) -> ([f32; 2], f32) {
+    let settled = |axis: usize| {
+        let side = known[axis] * target[axis].signum();
+        target[axis] == 0.0 || !(-LOST..CONTENT).contains(&side)
     };
-    let fitted =
-        fit::solve_for(&Problem { grid, sheets, layers, time: TIME_LINEAR, space: SPACE_LINEAR, prior: None, known: None, target });
-    let stored = |distance: f32| field_distance(field_code(libm::roundf(distance * 256.0) as i32)) as f32 / 256.0;
-    let strip = thin.iter().map(|&thin| thin != Thin::No).collect();
-    Fields { distance: fitted.uv.iter().map(|pair| pair.map(stored)).collect(), strip }
+    let wanted = [0, 1].map(|axis| if settled(axis) { known[axis] } else { CONTENT * target[axis].signum() });
+    (wanted, if settled(0) && settled(1) { weight * CALM } else { weight.max(URGENT) })
 }
 
 /// The target and weight of one field: the distance from the outline, from those along the two axes.

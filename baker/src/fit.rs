@@ -109,6 +109,8 @@ pub struct Problem<'a, T> {
     pub prior: Option<&'a [Prior]>,
     /// Values that a fit has already: pixels that are far from them count less. `None`: all count the same.
     pub known: Option<&'a [[f32; 2]]>,
+    /// What a fit after the first asks of a pixel, given what it has, the pixel's target and its weight.
+    pub refit: fn([f32; 2], [f32; 2], f32) -> ([f32; 2], f32),
     /// The target and weight of a G-buffer pixel for the sheet at a place in the list of its cell (interval times cells plus cell);
     /// `None`: the sheet does not care.
     pub target: T,
@@ -130,12 +132,17 @@ pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers
         let own = gbuffer.label[pixel] == u16::from(sheets.lists[index][sheet]);
         own.then(|| (gbuffer.uv[pixel], 1.0))
     };
-    let problem = Problem { grid, sheets, layers, time: grid.time, space: grid.space, prior: Some(prior), known: None, target };
+    let problem = Problem { grid, sheets, layers, time: grid.time, space: grid.space, prior: Some(prior), known: None, refit: robust, target };
     let mut fit = solve_for(&problem);
     for _ in 0..REFITS {
         fit = solve_for(&Problem { known: Some(&fit.uv), target, ..problem });
     }
     fit
+}
+
+/// Cauchy's weights: see [`ROBUST`].
+fn robust([a, b]: [f32; 2], [u, v]: [f32; 2], weight: f32) -> ([f32; 2], f32) {
+    ([u, v], weight / (1.0 + ((a - u) * (a - u) + (b - v) * (b - v)) / (ROBUST * ROBUST)))
 }
 
 /// Fits two quantities of all layers to the targets of `problem`.
@@ -255,10 +262,9 @@ where
         grid.each_pixel(frame, place[1], |pixel, at| {
             let (points, shares) = patch::around(at);
             for (sheet, (sums, right, seen)) in frame_sums.iter_mut().enumerate() {
-                let Some(([u, v], mut weight)) = (problem.target)(index, sheet, pixel) else { continue };
+                let Some(([mut u, mut v], mut weight)) = (problem.target)(index, sheet, pixel) else { continue };
                 if let Some(known) = &known {
-                    let [a, b] = patch::value(&known[sheet], (points, shares));
-                    weight /= 1.0 + ((a - u) * (a - u) + (b - v) * (b - v)) / (ROBUST * ROBUST);
+                    ([u, v], weight) = (problem.refit)(patch::value(&known[sheet], (points, shares)), [u, v], weight);
                 }
                 sums.add(points[0] / 3 * 2 + points[0] % 3, shares, weight);
                 for (point, share) in points.into_iter().zip(shares) {

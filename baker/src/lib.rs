@@ -19,6 +19,7 @@ pub mod metrics;
 pub mod order;
 pub mod patch;
 pub mod planes;
+pub mod polish;
 pub mod ram;
 pub mod report;
 mod samples;
