@@ -2,7 +2,7 @@
 //! Values come from `key`, weights from `timeline`; results go to `cell` and `span`.
 //!
 //! A number's unit goes with its place: stored positions count 1/32 to 1/128 texel, as the bundle says, playback's are Q15.16 texels; time weights are Q14;
-//! a field is a code from -73 to 73 where it is stored, Q8 pixels in a key, Q16 pixels during playback.
+//! a field is a code from -37 to 37 where it is stored, Q8 pixels in a key, Q16 pixels during playback.
 
 /// Fraction bits that a stored coordinate can have: 5 reach from 512 texels outside the picture to 1536, each more halves that.
 pub const KEY_BITS: core::ops::RangeInclusive<u8> = 5..=7;
@@ -70,16 +70,16 @@ pub const fn middle(before: Option<i32>, from: i32, to: i32, after: Option<i32>)
 }
 
 /// The largest size of a field code, which stands for 128 pixels.
-pub const MAX_FIELD: i32 = 73;
+pub const MAX_FIELD: i32 = 37;
 
-/// The distance that field code `code` stands for, Q8 pixels: eight steps an octave from 1/4 pixel, with a sign; 0 is 0.
+/// The distance that field code `code` stands for, Q8 pixels: four steps an octave from 1/4 pixel, with a sign; 0 is 0.
 #[must_use]
 pub fn field_distance(code: i8) -> i32 {
-    // 64 * 2^(i / 8).
-    const STEPS: [i32; 8] = [64, 70, 76, 83, 91, 99, 108, 117];
+    // 64 * 2^(i / 4).
+    const STEPS: [i32; 4] = [64, 76, 91, 108];
     let size = u32::from(code.unsigned_abs()).min(MAX_FIELD as u32);
     let Some(index) = size.checked_sub(1) else { return 0 };
-    let distance = STEPS.get(index as usize & 7).copied().unwrap_or(0).wrapping_shl(index >> 3);
+    let distance = STEPS.get(index as usize & 3).copied().unwrap_or(0).wrapping_shl(index >> 2);
     if code < 0 { distance.wrapping_neg() } else { distance }
 }
 
@@ -105,11 +105,11 @@ mod tests {
 
     #[test]
     fn field_codes_come_back() {
-        for code in -73..=73i8 {
+        for code in -37..=37i8 {
             assert_eq!(field_code(field_distance(code)), code);
         }
-        assert_eq!(field_distance(73), 128 << 8);
-        assert_eq!((field_code(1 << 30), field_code(-(1 << 30)), field_code(20)), (73, -73, 0));
+        assert_eq!(field_distance(37), 128 << 8);
+        assert_eq!((field_code(1 << 30), field_code(-(1 << 30)), field_code(20)), (37, -37, 0));
     }
 
     #[test]

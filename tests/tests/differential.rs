@@ -194,10 +194,10 @@ fn weights_at_keys_a_power_of_two_apart_are_exact() {
 }
 
 #[test]
-fn field_codes_are_eight_to_an_octave() {
+fn field_codes_are_four_to_an_octave() {
     assert_eq!(field_distance(0), 0);
     for code in 1..=MAX_FIELD as i8 {
-        let exact = 0.25 * 2f64.powf(f64::from(code - 1) / 8.0);
+        let exact = 0.25 * 2f64.powf(f64::from(code - 1) / 4.0);
         let found = f64::from(field_distance(code)) / 256.0;
         assert!((found / exact - 1.0).abs() < 0.01, "code {code}: {found} for {exact}");
         assert_eq!(field_distance(-code), -field_distance(code));
