@@ -386,6 +386,28 @@ mod tests {
     }
 
     #[test]
+    fn a_picture_is_packed_where_it_does_not_fit_raw() {
+        let scene = small("street");
+        let bake = |goal, storage| {
+            let options = Options { goal, storage, truth: TruthFrames::All, ..Options::default() };
+            bake_scene(&scene, &options, &|_, _| {}).unwrap()
+        };
+        let (plain, _) = bake(Goal::AsSet, None);
+        let tight = Goal::Budget(plain.len() as u64 * 6 / 10);
+        let told = |report: &crate::Report| report.warnings.iter().any(|warning| warning.contains("--storage raw"));
+        let (bytes, open) = bake(tight, None);
+        assert!(bytes.len() <= plain.len() * 6 / 10 && open.source_image.storage == Storage::Packed && told(&open), "{:?}", open.warnings);
+        assert!(open.memory.picture == open.source_image.raw_bytes && open.source_image.stored_bytes < open.source_image.raw_bytes);
+        let (_, raw) = bake(tight, Some(Storage::Raw));
+        assert!(raw.source_image.storage == Storage::Raw && raw.memory.picture == 0 && !told(&raw));
+        let psnr = |report: &crate::Report| report.quality_vs_truth.unwrap().psnr_mean;
+        assert!(psnr(&open) > psnr(&raw), "{} {}", psnr(&open), psnr(&raw));
+        // Where there is room, flash is where the picture stays.
+        let (_, wide) = bake(Goal::Budget(plain.len() as u64 * 4), None);
+        assert!(wide.source_image.storage == Storage::Raw && !told(&wide));
+    }
+
+    #[test]
     fn a_quality_is_reached_or_the_nearest_is_named() {
         let scene = small("cone-orbit");
         let bake = |asked| {

@@ -66,6 +66,8 @@ impl<'m> Cutter<'m> {
 }
 
 /// The source image: a packed one is unpacked here.
+// Rarely called and long: in one place, whoever cuts memory.
+#[inline(never)]
 fn picture<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>) -> Texture<'m> {
     let texture = bundle.texture();
     let Some(packed) = bundle.packed() else { return texture };

@@ -91,7 +91,9 @@ mod tests {
         };
         let places = || (0..side * side).map(|i| (i % side, i / side));
         let inside = |(x, y): (usize, usize)| (2 * x).abs_diff(side).pow(2) + (2 * y).abs_diff(side).pow(2) < side * side;
-        let texel = |place: (usize, usize)| if inside(place) { (100 * (place.0 + place.1) / side) as u8 + random() % noise } else { 0 };
+        let texel = |place: (usize, usize)| {
+            if inside(place) { ((70 * (place.0 + place.1) / side) as u8).wrapping_add(random() % noise) } else { 0 }
+        };
         (places().map(texel).collect(), places().map(inside).collect())
     }
 
