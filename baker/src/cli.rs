@@ -95,9 +95,9 @@ pub struct Bake {
     pub colours: u16,
     /// How the bundle holds the source image [default: raw].
     ///
-    /// Raw plays straight from flash, at no memory. Packed takes less than half the bytes and is unpacked once, before the first frame, into
-    /// memory: a byte a texel and an eighth. Where flash is slow and memory is not, as on an RP2040, that also draws faster. With --budget the search
-    /// may pack what does not fit raw, unless this is given; --ram counts it.
+    /// Raw plays straight from flash, at no memory. Packed takes a tenth to a quarter of the bytes and is unpacked once, before the first frame,
+    /// into memory: a byte a texel and an eighth for the mask, at some hundred instructions each. Where flash is slow and memory is not, as on
+    /// an RP2040, it then draws faster. With --budget the search may pack what does not fit raw, unless this is given; --ram counts it.
     #[arg(long, value_enum, value_name = "KIND")]
     pub storage: Option<Storage>,
     /// Every Nth key needs no earlier one: a seek decodes at most N + 1 keys.

@@ -49,14 +49,15 @@ pub fn code<B: Bits>(bits: &mut B, contexts: &mut [Probability], recent: &mut [R
     let Some((same, rest)) = contexts.split_at_mut_checked(SAME) else { return };
     let Some((again, spelt)) = rest.split_at_mut_checked(AGAIN) else { return };
     let mut models = Models { same, again, spelt, recent };
-    for row in 0..picture.texels.len().wrapping_shr(picture.width_log2) {
-        for column in 0..1usize.wrapping_shl(picture.width_log2) {
-            let at = row.wrapping_shl(picture.width_log2).wrapping_add(column);
-            let around = Around::of(picture, at, row, column);
-            if let Some(texel) = picture.texels.get_mut(at) {
-                *texel = models.texel(bits, &around, *texel);
-            }
-        }
+    let Picture { width_log2, texels, mask } = picture;
+    let width = 1usize.wrapping_shl(*width_log2);
+    for row in 0..texels.len().wrapping_shr(*width_log2) {
+        let start = row.wrapping_shl(*width_log2);
+        let Some((done, own)) = texels.split_at_mut_checked(start) else { return };
+        // Rows that are not there are empty.
+        let above = |rows: usize| done.get(start.wrapping_sub(width.wrapping_mul(rows))..).unwrap_or(&[]);
+        let covered = mask.get(start >> 3..).unwrap_or(&[]);
+        models.row(bits, own.get_mut(..width).unwrap_or(&mut []), above(1), above(2), covered);
     }
 }
 
@@ -68,26 +69,31 @@ fn coded<B: Bits>(bits: &mut B, contexts: &mut [Probability], context: usize, bi
 
 /// Codes the mask: each bit by the two to its left, the five above these and the three above those.
 fn code_mask<B: Bits>(bits: &mut B, contexts: &mut [Probability], picture: &mut Picture<'_>) {
-    let (log2, mask) = (picture.width_log2, &mut *picture.mask);
-    let width = 1usize.wrapping_shl(log2);
-    for row in 0..mask.len().wrapping_mul(8).wrapping_shr(log2) {
-        // The bit `up` rows above, in a column; 0 outside the picture.
-        let above = |mask: &[u8], up: usize, column: usize| {
-            let Some(row) = row.checked_sub(up).filter(|_| column < width) else { return 0 };
-            let at = row.wrapping_shl(log2).wrapping_add(column);
-            usize::from(mask.get(at >> 3).copied().unwrap_or(0) >> (at & 7) & 1)
+    let bytes = 1usize.wrapping_shl(picture.width_log2) >> 3;
+    for row in 0..picture.mask.len().wrapping_mul(8).wrapping_shr(picture.width_log2) {
+        let start = row.wrapping_mul(bytes);
+        let Some((done, own)) = picture.mask.split_at_mut_checked(start) else { return };
+        // A row above; empty where there is none.
+        let above = |rows: usize| {
+            let from = start.wrapping_sub(bytes.wrapping_mul(rows));
+            done.get(from..from.wrapping_add(bytes)).unwrap_or(&[])
         };
-        let mut own = 0usize;
-        let mut first = above(mask, 1, 0) << 1 | above(mask, 1, 1);
-        let mut second = above(mask, 2, 0);
-        for column in 0..width {
-            first = (first << 1 | above(mask, 1, column.wrapping_add(2))) & 31;
-            second = (second << 1 | above(mask, 2, column.wrapping_add(1))) & 7;
-            let at = row.wrapping_shl(log2).wrapping_add(column);
-            let Some(byte) = mask.get_mut(at >> 3) else { return };
-            let bit = coded(bits, contexts, second << 7 | first << 2 | own, *byte >> (at & 7) & 1 == 1);
-            *byte = *byte & !(1u8 << (at & 7)) | u8::from(bit) << (at & 7);
-            own = (own << 1 | usize::from(bit)) & 3;
+        let (near, far) = (above(1), above(2));
+        let bit = |row: &[u8], column: usize| row.get(column >> 3).map_or(0, |byte| usize::from(byte >> (column & 7) & 1));
+        let (mut left, mut first, mut second) = (0usize, bit(near, 0) << 1 | bit(near, 1), bit(far, 0));
+        let mut column = 0usize;
+        for byte in own.iter_mut().take(bytes) {
+            let mut coming = *byte;
+            for _ in 0..8 {
+                first = (first << 1 | bit(near, column.wrapping_add(2))) & 31;
+                second = (second << 1 | bit(far, column.wrapping_add(1))) & 7;
+                let covered = coded(bits, contexts, second << 7 | first << 2 | left, coming & 1 == 1);
+                // What is coded comes in at the top as what is wanted goes out at the bottom.
+                coming = coming >> 1 | u8::from(covered) << 7;
+                left = (left << 1 | usize::from(covered)) & 3;
+                column = column.wrapping_add(1);
+            }
+            *byte = coming;
         }
     }
 }
@@ -107,32 +113,6 @@ struct Around {
 }
 
 impl Around {
-    /// What is known around the texel with the index `at`.
-    #[inline]
-    fn of(picture: &Picture<'_>, at: usize, row: usize, column: usize) -> Self {
-        let width = 1usize.wrapping_shl(picture.width_log2);
-        let texel = |exists: bool, before: usize| picture.texels.get(at.wrapping_sub(before)).copied().filter(|_| exists);
-        let (up, left) = (row > 0, column > 0);
-        let above = texel(up, width);
-        let west = texel(left, 1).or(above).unwrap_or(0);
-        let north = above.unwrap_or(west);
-        let north_west = texel(up && left, width.wrapping_add(1)).unwrap_or(north);
-        let north_east = texel(up && column.wrapping_add(1) < width, width.wrapping_sub(1)).unwrap_or(north);
-        let west_west = texel(column > 1, 2).unwrap_or(west);
-        let north_north = texel(row > 1, width.wrapping_mul(2)).unwrap_or(north);
-        let pairs = [(west, north), (north, north_west), (north_west, west), (north, north_east), (west, west_west), (north, north_north)];
-        let agree = pairs.iter().rev().fold(0, |bits, (a, b)| bits << 1 | usize::from(a == b));
-        let apart = |a: u8, b: u8| u32::from(a.abs_diff(b));
-        let activity = match apart(west, north_west).wrapping_add(apart(north, north_west)).wrapping_add(apart(north, north_east)) {
-            0..3 => 0,
-            3..10 => 1,
-            10..40 => 2,
-            _ => 3,
-        };
-        let covered = picture.mask.get(at >> 3).is_none_or(|byte| byte >> (at & 7) & 1 == 1);
-        Self { west, north, north_east, north_west, agree, activity, covered: usize::from(covered) }
-    }
-
     /// Where the neighbours would go on to: a plane through them, kept between the least and the most of them.
     fn onwards(&self) -> i32 {
         let [west, north, corner] = [self.west, self.north, self.north_west].map(i32::from);
@@ -150,6 +130,40 @@ struct Models<'m> {
 }
 
 impl Models<'_> {
+    /// Codes a row of texels; `above` and `second` begin with the rows above it, `mask` with its own bits. Any of them is empty where it is not there.
+    fn row<B: Bits>(&mut self, bits: &mut B, own: &mut [u8], above: &[u8], second: &[u8], mask: &[u8]) {
+        let mut mask = mask.iter();
+        let mut covered = 0u32;
+        let mut west = above.first().copied().unwrap_or(0);
+        let (mut west_west, mut corner) = (west, west);
+        // Row ends are where rows above end, whatever follows.
+        let above = above.get(..own.len()).unwrap_or(&[]);
+        for (column, texel) in own.iter_mut().enumerate() {
+            if column & 7 == 0 {
+                covered = mask.next().map_or(0xff, |&byte| u32::from(byte));
+            }
+            let north = above.get(column).copied().unwrap_or(west);
+            let north_west = if above.is_empty() { north } else { corner };
+            let north_east = above.get(column.wrapping_add(1)).copied().unwrap_or(north);
+            let north_north = second.get(column).copied().unwrap_or(north);
+            let pairs =
+                [(west, north), (north, north_west), (north_west, west), (north, north_east), (west, west_west), (north, north_north)];
+            let agree = pairs.iter().rev().fold(0, |bits, (a, b)| bits << 1 | usize::from(a == b));
+            let apart = |a: u8, b: u8| u32::from(a.abs_diff(b));
+            let activity = match apart(west, north_west).wrapping_add(apart(north, north_west)).wrapping_add(apart(north, north_east)) {
+                0..3 => 0,
+                3..10 => 1,
+                10..40 => 2,
+                _ => 3,
+            };
+            let around = Around { west, north, north_east, north_west, agree, activity, covered: covered as usize & 1 };
+            *texel = self.texel(bits, &around, *texel);
+            covered >>= 1;
+            west_west = if column == 0 { *texel } else { west };
+            (west, corner) = (*texel, north);
+        }
+    }
+
     /// Codes one texel.
     fn texel<B: Bits>(&mut self, bits: &mut B, around: &Around, wanted: u8) -> u8 {
         let &Around { west, north, north_east, north_west, agree, activity, covered } = around;
