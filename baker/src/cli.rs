@@ -97,7 +97,7 @@ pub struct Bake {
     ///
     /// Raw plays straight from flash, at no memory. Packed takes a tenth to a quarter of the bytes and is unpacked once, before the first frame,
     /// into memory: a byte a texel and an eighth for the mask, at some hundred instructions each. Where flash is slow and memory is not, as on
-    /// an RP2040, it then draws faster. With --budget the search may pack what does not fit raw, unless this is given; --ram counts it.
+    /// an RP2040, drawing can then be faster. With --budget the search may pack what does not fit raw, unless this is given; --ram counts it.
     #[arg(long, value_enum, value_name = "KIND")]
     pub storage: Option<Storage>,
     /// Every Nth key needs no earlier one: a seek decodes at most N + 1 keys.

@@ -49,11 +49,11 @@ pub struct Grid {
 pub struct Bytes {
     /// The whole bundle.
     pub bundle: usize,
-    /// The source image with its palette.
+    /// The source image with its palette; where it is packed, its mask too.
     pub atlas: usize,
     /// The labels.
     pub labels: usize,
-    /// The mask.
+    /// The mask, if the source image is raw.
     pub mask: usize,
     /// The key records, their table, and the planes and cameras that positions are told from.
     pub keys: usize,
