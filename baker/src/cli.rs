@@ -31,6 +31,8 @@ Examples:
                                          the smallest bundle of that quality
   cubist-bake fox.glb -o fox.cubist --ram 48K
                                          for a player with 48 x 1024 bytes of working memory
+  cubist-bake fox.glb -o fox.cubist --storage packed
+                                         the source image coded: less flash, more memory
   cubist-bake inspect fox.cubist         what a bundle holds, byte by section
 
 If something looks wrong, --diagnostics DIR shows the source image, and exact frames next to played ones.
@@ -91,6 +93,13 @@ pub struct Bake {
     /// Colours of the source image, at most, 2 to 256.
     #[arg(long, value_name = "N", default_value_t = atlas::Settings::default().colours as u16, value_parser = clap::value_parser!(u16).range(2..=256))]
     pub colours: u16,
+    /// How the bundle holds the source image [default: raw].
+    ///
+    /// Raw plays straight from flash, at no memory. Packed takes a tenth to a quarter of the bytes and is unpacked once, before the first frame,
+    /// into memory: a byte a texel and an eighth for the mask, at some hundred instructions each. Where flash is slow and memory is not, as on
+    /// an RP2040, drawing can then be faster. With --budget the search may pack what does not fit raw, unless this is given; --ram counts it.
+    #[arg(long, value_enum, value_name = "KIND")]
+    pub storage: Option<Storage>,
     /// Every Nth key needs no earlier one: a seek decodes at most N + 1 keys.
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=1000))]
     pub independent_every: u16,
@@ -146,6 +155,15 @@ pub enum Space {
     Linear,
     /// On a curve through four corners.
     Cubic,
+}
+
+/// How the bundle holds the source image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Storage {
+    /// As it is: read from flash, no memory.
+    Raw,
+    /// Coded: smaller in flash, unpacked into memory.
+    Packed,
 }
 
 /// What replaces the scene's playback.
@@ -206,6 +224,7 @@ impl Bake {
             Time::Linear => TIME_LINEAR,
             Time::Cubic => TIME_CUBIC,
         };
+        let storage = |storage| if storage == Storage::Raw { atlas::Storage::Raw } else { atlas::Storage::Packed };
         let space = |space| if space == Space::Linear { SPACE_LINEAR } else { SPACE_CUBIC };
         Options {
             cell: self.cell,
@@ -213,7 +232,13 @@ impl Bake {
             time: self.time.map(time),
             space: self.space.map(space),
             even_keys: self.even_keys,
-            source: atlas::Settings { max_side: self.atlas, density: self.density, colours: self.colours.into() },
+            source: atlas::Settings {
+                max_side: self.atlas,
+                density: self.density,
+                colours: self.colours.into(),
+                ..atlas::Settings::default()
+            },
+            storage: self.storage.map(storage),
             independent_every: self.independent_every.into(),
             goal,
             truth: self.truth,
@@ -330,6 +355,8 @@ mod tests {
         let options = Cli::try_parse_from(wanted).unwrap().bake.options(0.0);
         assert_eq!((options.goal, options.even_keys), (Goal::Ram(16_384), true));
         assert_eq!((options.time, options.space), (Some(TIME_LINEAR), Some(SPACE_CUBIC)));
+        let packed = Cli::try_parse_from(["cubist-bake", "a.glb", "-o", "a.cubist", "--storage", "packed"]).unwrap().bake.options(0.0);
+        assert_eq!(packed.source().storage, atlas::Storage::Packed);
         assert!(Cli::try_parse_from(["cubist-bake", "inspect", "a.cubist", "--json"]).unwrap().command.is_some());
         for wrong in [
             &["cubist-bake", "a.toml"][..],
@@ -338,6 +365,7 @@ mod tests {
             &["cubist-bake", "a.toml", "-o", "b", "--ram", "30K", "--psnr", "30"],
             &["cubist-bake", "a.toml", "-o", "b", "--time", "square"],
             &["cubist-bake", "a.toml", "-o", "b", "--space", "hold"],
+            &["cubist-bake", "a.toml", "-o", "b", "--storage", "zip"],
             &["cubist-bake", "a.toml", "-o", "b", "--cell", "7"],
             &["cubist-bake", "a.toml", "-o", "b", "--psnr", "nan"],
             &["cubist-bake", "a.toml", "-o", "b", "--atlas", "32"],

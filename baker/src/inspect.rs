@@ -1,7 +1,8 @@
 //! Inspection: what a bundle holds, byte by section.
 //! Bytes come from a file or the encoder; figures go to `cubist-bake inspect` and to the report's byte counts.
 
-use cubist_core::format::{ATLAS, FIXED, INFO, LABELS, MASK, MASKED, PATH, SPACE_LINEAR, STRIP, TIME_HOLD, TIME_LINEAR, VERSION};
+use crate::encode::unpacked;
+use cubist_core::format::{ATLAS, FIXED, INFO, LABELS, MASK, MASKED, PACKED, PATH, SPACE_LINEAR, STRIP, TIME_HOLD, TIME_LINEAR, VERSION};
 use cubist_core::plane::Plane;
 use cubist_core::{Bundle, BundleError};
 use serde::Serialize;
@@ -102,8 +103,12 @@ pub struct PathInfo {
 pub struct ImageInfo {
     /// Texels a row and rows.
     pub size: [u32; 2],
-    /// How texels are stored.
+    /// How texels are stored: 0 raw, 1 packed.
     pub encoding: u8,
+    /// Bytes of texels and mask, as they are stored.
+    pub stored_bytes: usize,
+    /// Bytes of texels and mask, raw.
+    pub raw_bytes: usize,
     /// Palette entries.
     pub colours: usize,
     /// Texels that belong to a chart; `None`: no label is masked.
@@ -195,8 +200,9 @@ impl Inspection {
         let (path, atlas) = (bundle.path(), bundle.atlas());
         let (width, height) = bundle.size();
         let cell = 1u32 << path.cell_log2;
-        let masked = (0..bundle.label_count()).any(|label| bundle.label(label as u8).flags & MASKED != 0);
-        let covered = find(MASK).filter(|_| masked).map(|mask| mask.iter().map(|byte| u64::from(byte.count_ones())).sum());
+        let (texels, mask) = unpacked(&bundle);
+        let raw_bytes = texels.len() + mask.len();
+        let covered = bundle.masked().then(|| mask.iter().map(|byte| u64::from(byte.count_ones())).sum());
         let limits = bundle.limits();
         Ok(Self {
             version: VERSION,
@@ -235,6 +241,8 @@ impl Inspection {
             image: ImageInfo {
                 size: [1 << atlas.width_log2, u32::from(atlas.height)],
                 encoding: atlas.encoding,
+                stored_bytes: bundle.packed().map_or(raw_bytes, <[u8]>::len),
+                raw_bytes,
                 colours: atlas.palette.len() / 2,
                 covered_texels: covered,
             },
@@ -265,6 +273,12 @@ impl Inspection {
     #[must_use]
     pub fn key_bytes(&self) -> usize {
         self.path.table_bytes + self.path.plane_bytes + self.path.camera_bytes + self.path.record_bytes
+    }
+
+    /// Bytes of working memory that the unpacked source image takes; 0 where it is raw.
+    #[must_use]
+    pub fn unpacked_bytes(&self) -> usize {
+        if self.image.encoding == PACKED { self.image.raw_bytes } else { 0 }
     }
 
     /// The inspection as lines of text.
@@ -322,10 +336,8 @@ impl Inspection {
         let covered = image
             .covered_texels
             .map_or_else(|| "all".to_owned(), |n| format!("{n}, {:.1} %", 100.0 * n as f64 / f64::from(image.size[0] * image.size[1])));
-        line(format!(
-            "ATLS  {} x {} texels, encoding {}, {} colours; covered: {covered}",
-            image.size[0], image.size[1], image.encoding, image.colours
-        ));
+        line(format!("ATLS  {} x {} texels, {} colours; covered: {covered}", image.size[0], image.size[1], image.colours));
+        line(format!("      {}", image.storage()));
         for (index, row) in self.palette.chunks(12).enumerate() {
             line(format!("      colours from {:>3}  {}", index * 12, row.join(" ")));
         }
@@ -349,6 +361,19 @@ impl Inspection {
             l.key_layers, l.list_bytes, l.row_layers, l.row_sheets, l.cell_sheets, l.fields, l.seek_keys
         ));
         out
+    }
+}
+
+impl ImageInfo {
+    /// How the image is stored, and what that takes.
+    fn storage(&self) -> String {
+        let Self { encoding, stored_bytes, raw_bytes, .. } = *self;
+        if encoding == PACKED {
+            let percent = 100.0 * stored_bytes as f64 / raw_bytes.max(1) as f64;
+            format!("packed: {stored_bytes} bytes with the mask, {percent:.1} % of the {raw_bytes} that it takes in working memory")
+        } else {
+            format!("raw: {raw_bytes} bytes with the mask, read where they lie, no working memory")
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! A whole job: a scene and what the user asks of its bundle in; the bundle, verified, and its report out.
 //! The stages are `bake`'s, the search is `tune`'s, the figures are `verify`'s.
 
-use crate::atlas;
+use crate::atlas::{self, Storage};
 use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings};
 use crate::inspect::Inspection;
 use crate::report::{Origin, Report, Seconds};
@@ -53,6 +53,8 @@ pub struct Options {
     pub even_keys: bool,
     /// The source image; a search may make it coarser.
     pub source: atlas::Settings,
+    /// How the bundle holds it, in place of `source.storage`; `None`: as that says, but a search for a budget may pack it.
+    pub storage: Option<Storage>,
     /// Every this many keys one that needs no earlier one.
     pub independent_every: usize,
     /// What to reach.
@@ -72,6 +74,7 @@ impl Default for Options {
             space: None,
             even_keys: false,
             source: atlas::Settings::default(),
+            storage: None,
             independent_every: Settings::default().coding.independent_every,
             goal: Goal::AsSet,
             truth: TruthFrames::Most(16),
@@ -84,7 +87,7 @@ impl Options {
     /// The settings for a screen `width` pixels wide, the baker's choices filled in.
     #[must_use]
     pub fn settings(&self, width: u32) -> Settings {
-        let mut settings = Settings { atlas: self.source, ..Settings::default() };
+        let mut settings = Settings { atlas: self.source(), ..Settings::default() };
         settings.coding.independent_every = self.independent_every;
         settings.cell = self.cell.unwrap_or(if width > WIDE { 16 } else { settings.cell });
         settings.key_interval = self.key_interval.unwrap_or(settings.key_interval);
@@ -92,6 +95,12 @@ impl Options {
         settings.space = self.space.unwrap_or(settings.space);
         settings.adapt_keys = !self.even_keys;
         settings
+    }
+
+    /// The source image, stored as asked for.
+    #[must_use]
+    pub fn source(&self) -> atlas::Settings {
+        atlas::Settings { storage: self.storage.unwrap_or(self.source.storage), ..self.source }
     }
 
     /// What else helps where a search finds nothing: to leave to it what is given; nothing where nothing is. `cells`: the search would try other
@@ -102,6 +111,7 @@ impl Options {
             (self.key_interval.is_some(), "--key-interval"),
             (!cells && self.time.is_some(), "--time"),
             (!cells && self.space.is_some(), "--space"),
+            (!cells && self.storage == Some(Storage::Packed), "--storage"),
         ];
         let given: Vec<&str> = all.into_iter().filter_map(|(given, name)| given.then_some(name)).collect();
         if given.is_empty() { String::new() } else { format!(", or leave {} to the search", given.join(" and ")) }

@@ -182,6 +182,7 @@ fn gave_up(room: usize, asked: &Settings, whole: Option<(usize, f64)>, tried: &T
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::atlas::Storage;
     use crate::job::{Goal, Options, TruthFrames, bake_scene};
     use crate::report::Report;
     use crate::scene::{Scene, builtin};
@@ -216,6 +217,19 @@ mod tests {
         let (less, bytes, report) = bake(Some(memory - 1), Options::default()).unwrap();
         let warning = report.warnings.iter().find(|warning| warning.contains("--ram")).unwrap();
         assert!(less < memory && bytes != plain && warning.contains(&grouped(memory)) && warning.contains("dB"), "{warning}");
+    }
+
+    #[test]
+    fn an_unpacked_picture_counts() {
+        let (raw, ..) = bake(None, Options::default()).unwrap();
+        let storage = Some(Storage::Packed);
+        let (packed, _, report) = bake(None, Options { storage, ..Options::default() }).unwrap();
+        assert!(report.memory.picture > 0 && packed == raw + report.memory.picture, "{packed} {raw}");
+        // What would do for a raw one does not: something else has to go, for the picture was asked for.
+        let (_, _, report) = bake(Some(packed - 1), Options { storage, ..Options::default() }).unwrap();
+        assert!(report.source_image.storage == Storage::Packed && report.warnings.iter().any(|warning| warning.contains("--ram")));
+        let error = bake(Some(1_000), Options { storage, ..Options::default() }).err().unwrap().to_string();
+        assert!(error.ends_with("or leave --storage to the search"), "{error}");
     }
 
     #[test]

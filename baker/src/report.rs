@@ -1,6 +1,7 @@
 //! The report: what a bake cost and what it reached, for people and scripts.
 //! Figures come from the finished bytes through [`Inspection`] and `verify`; JSON and table rows go out.
 
+use crate::atlas::Storage;
 use crate::bake::{Encoded, Flat, Settings};
 use crate::inspect::Inspection;
 use crate::scene::Scene;
@@ -48,11 +49,11 @@ pub struct Grid {
 pub struct Bytes {
     /// The whole bundle.
     pub bundle: usize,
-    /// The source image with its palette.
+    /// The source image with its palette; where it is packed, its mask too.
     pub atlas: usize,
     /// The labels.
     pub labels: usize,
-    /// The mask.
+    /// The mask, if the source image is raw.
     pub mask: usize,
     /// The key records, their table, and the planes and cameras that positions are told from.
     pub keys: usize,
@@ -71,6 +72,8 @@ pub struct Memory {
     pub workspace: usize,
     /// A row of pixels.
     pub row: usize,
+    /// Of `workspace`, the unpacked source image; 0 where it is raw.
+    pub picture: usize,
 }
 
 /// The source image.
@@ -82,6 +85,12 @@ pub struct Source {
     pub height: u32,
     /// Palette entries.
     pub colours: usize,
+    /// How it is stored.
+    pub storage: Storage,
+    /// Bytes of texels and mask as they are stored.
+    pub stored_bytes: usize,
+    /// Bytes of texels and mask, raw.
+    pub raw_bytes: usize,
     /// Connected regions.
     pub charts: usize,
     /// Labels, the background included.
@@ -171,6 +180,9 @@ impl Report {
                 width: image.width,
                 height: image.height,
                 colours: image.palette.len(),
+                storage: settings.atlas.storage,
+                stored_bytes: inspection.image.stored_bytes,
+                raw_bytes: inspection.image.raw_bytes,
                 charts: figures.charts,
                 labels: figures.labels,
                 fill: figures.fill,
@@ -187,7 +199,7 @@ impl Report {
                 keys_per_frame: keys as f64 / frames,
                 per_frame: inspection.bytes as f64 / frames,
             },
-            memory: Memory { workspace: inspection.workspace, row: play.width as usize * 2 },
+            memory: Memory { workspace: inspection.workspace, row: play.width as usize * 2, picture: inspection.unpacked_bytes() },
             quality,
             quality_vs_truth: truth,
             work,
@@ -279,12 +291,16 @@ pub fn table(report: &Report) -> Vec<(String, String)> {
     row(
         "source image",
         format!(
-            "{} bytes: {} x {} texels, {} colours, {:.0} % covered",
+            "{} bytes: {} x {} texels, {} colours, {:.0} % covered; {}",
             grouped(bytes.atlas),
             image.width,
             image.height,
             image.colours,
-            100.0 * image.fill
+            100.0 * image.fill,
+            match image.storage {
+                Storage::Raw => "raw".to_owned(),
+                Storage::Packed => format!("packed, with the mask, from {}", grouped(image.raw_bytes)),
+            }
         ),
     );
     row("labels, mask", format!("{} bytes: {} labels for {} charts", grouped(bytes.labels + bytes.mask), image.labels, image.charts));
@@ -314,7 +330,9 @@ pub fn table(report: &Report) -> Vec<(String, String)> {
             grouped(work.coverage_tests_worst as usize)
         ),
     );
-    row("working memory", format!("{} bytes and a row of {}", grouped(report.memory.workspace), grouped(report.memory.row)));
+    let picture =
+        if report.memory.picture > 0 { format!(", {} of them the source image", grouped(report.memory.picture)) } else { String::new() };
+    row("working memory", format!("{} bytes{picture}, and a row of {}", grouped(report.memory.workspace), grouped(report.memory.row)));
     row("speed here", format!("{:.0} frames/s on one thread", work.host_frames_per_second));
     let search = if seconds.search > 0.0 { format!(", search {:.1}", seconds.search) } else { String::new() };
     row(

@@ -2,10 +2,12 @@
 //! A scene and a goal come from `job`; the winner goes back there. Rays are cast once; whatever is tried is baked, played
 //! and measured. What is tried, and in which order, depends on nothing but the scene and the options.
 
-use crate::atlas::{self, Atlas};
+use crate::atlas::{self, Storage};
 use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings};
+use crate::encode::{self, image_bytes};
 use crate::gbuffer::Hits;
 use crate::job::{self, Chosen, Goal, Options};
+use crate::report::grouped;
 use crate::samples::Samples;
 use crate::scene::Scene;
 use crate::trace::Tracer;
@@ -71,9 +73,32 @@ pub(crate) struct Search<'a> {
 /// A source image, measured.
 struct Image {
     source: atlas::Settings,
+    /// Bytes stored as asked for; packed, if that is left to the search.
     bytes: usize,
+    packed: Option<usize>,
     /// Mean squared error of exact rays through it against the truth.
     error: f64,
+}
+
+impl Image {
+    /// The fewest bytes that it can take.
+    fn least(&self) -> usize {
+        self.packed.map_or(self.bytes, |packed| packed.min(self.bytes))
+    }
+
+    /// Whether it has to be packed to fit into `budget` with `keys`: what fits as it is plays from flash.
+    fn has_to_be_packed(&self, keys: &Keys, budget: u64) -> bool {
+        (self.bytes + keys.bytes) as u64 > budget && self.least() < self.bytes
+    }
+
+    /// Bytes of a bundle with `keys`, and how the image is stored in it.
+    fn with(&self, keys: &Keys, budget: u64) -> (usize, atlas::Settings) {
+        if self.has_to_be_packed(keys, budget) {
+            (self.least() + keys.bytes, atlas::Settings { storage: Storage::Packed, ..self.source })
+        } else {
+            (self.bytes + keys.bytes, self.source)
+        }
+    }
 }
 
 /// A way to code keys, measured at one source image.
@@ -140,12 +165,12 @@ impl Search<'_> {
         let room = usize::try_from(budget).unwrap_or(usize::MAX);
         let mut images: Vec<Image> = Vec::new();
         let mut reference: Option<Flat> = None;
-        let mut asked = self.options.source;
+        let mut asked = self.options.source();
         for (step, ratio) in DENSITIES.into_iter().enumerate() {
             self.say(step, steps);
             let source = atlas::Settings { density: asked.density * ratio, ..asked };
             if let Some(last) = images.last()
-                && last.bytes as f64 * (source.density / last.source.density).powi(2) > 1.5 * room as f64
+                && last.least() as f64 * (source.density / last.source.density).powi(2) > 1.5 * room as f64
                 && step + 1 < DENSITIES.len()
             {
                 continue;
@@ -155,8 +180,10 @@ impl Search<'_> {
                 // Where the image is full, densities above what it holds change nothing.
                 asked.density *= flat.atlas.figures.scale;
             }
-            let image = Image { source, bytes: image_bytes(&flat.atlas), error: samples.of_image(&flat.atlas) };
-            if reference.is_none() && (image.bytes < room / 10 * 9 || step + 1 == DENSITIES.len()) {
+            let packed = self.options.storage.is_none().then(|| image_bytes(&flat.atlas.image, Storage::Packed));
+            let bytes = image_bytes(&flat.atlas.image, source.storage);
+            let image = Image { source, bytes, packed, error: samples.of_image(&flat.atlas) };
+            if reference.is_none() && (image.least() < room / 10 * 9 || step + 1 == DENSITIES.len()) {
                 reference = Some(flat);
             }
             images.push(image);
@@ -167,16 +194,17 @@ impl Search<'_> {
         let mut pairs: Vec<(&Image, &Keys)> = images.iter().flat_map(|image| keys.iter().map(move |keys| (image, keys))).collect();
         pairs.sort_by(|a, b| {
             let error = |(image, keys): &(&Image, &Keys)| image.error + keys.error;
-            error(a).total_cmp(&error(b)).then((a.0.bytes + a.1.bytes).cmp(&(b.0.bytes + b.1.bytes)))
+            error(a).total_cmp(&error(b)).then(a.0.with(a.1, budget).0.cmp(&b.0.with(b.1, budget).0))
         });
         self.best_pair(budget, &pairs, &samples, steps)
     }
 
     /// Measures every way to code keys at one source image.
     fn keys(&self, flat: &Flat, samples: &Samples, steps: usize) -> Result<Vec<Keys>, BakeError> {
-        let (image_bytes, image_error) = (image_bytes(&flat.atlas), samples.of_image(&flat.atlas));
+        let asked = self.options.source();
+        let (image_bytes, image_error) = (image_bytes(&flat.atlas.image, asked.storage), samples.of_image(&flat.atlas));
         let (mut keys, mut exceeded) = (Vec::new(), None);
-        for grid in self.grids(self.options.source, &CELLS) {
+        for grid in self.grids(asked, &CELLS) {
             for lambda in BUDGET_LAMBDAS {
                 self.say(DENSITIES.len() + keys.len(), steps);
                 let mut settings = grid;
@@ -195,9 +223,9 @@ impl Search<'_> {
         let (mut best, mut exceeded): (Option<(f64, Settings)>, _) = (None, None);
         let (mut fitting, mut smallest) = (0, u64::MAX);
         // Where nothing is predicted to fit, the smallest prediction is tried all the same.
-        let least = pairs.iter().map(|(image, keys)| image.bytes + keys.bytes).min().unwrap_or(0);
+        let least = pairs.iter().map(|(image, keys)| image.with(keys, budget).0).min().unwrap_or(0);
         for (image, keys) in pairs {
-            let predicted = image.bytes + keys.bytes;
+            let (predicted, source) = image.with(keys, budget);
             if fitting == TRIES || (predicted as f64 > budget as f64 * SLACK && predicted > least) {
                 continue;
             }
@@ -206,7 +234,7 @@ impl Search<'_> {
                 Some((density, flat)) if density == image.source.density => flat,
                 _ => self.flat(image.source)?,
             };
-            let settings = Settings { atlas: image.source, ..keys.settings };
+            let settings = Settings { atlas: source, ..keys.settings };
             let encoded = possible(self.encode(&flat, &settings), &mut exceeded)?;
             current = Some((image.source.density, flat));
             let Some(Encoded { bundle, .. }) = encoded else { continue };
@@ -226,13 +254,21 @@ impl Search<'_> {
             Some((density, flat)) if density == settings.atlas.density => flat,
             _ => self.flat(settings.atlas)?,
         };
-        self.finish(flat, settings, Vec::new())
+        let packed = (settings.atlas.storage != self.options.source().storage).then(|| {
+            let image = &flat.atlas.image;
+            format!(
+                "--budget {budget}: the source image is packed to fit, and takes {} bytes of memory unpacked; --storage raw keeps it in flash, \
+                 at lower quality",
+                grouped(encode::raw_bytes(image))
+            )
+        });
+        self.finish(flat, settings, packed.into_iter().collect())
     }
 
     /// The smallest bundle whose mean PSNR against exact rays reaches `asked`.
     fn psnr(&self, asked: f64) -> Result<Chosen, BakeError> {
         let mut nearest = 0.0f64;
-        let mut source = self.options.source;
+        let mut source = self.options.source();
         let steps = CELLS.len() * INTERVALS.len() + QUALITY_LAMBDAS.len();
         for (step, ratio) in DENSITIES.into_iter().enumerate() {
             if step > 0 && ratio > 0.8 {
@@ -320,13 +356,6 @@ pub(crate) fn possible<T>(attempt: Result<T, BakeError>, exceeded: &mut Option<B
     }
 }
 
-/// Bytes that a source image takes in a bundle, with its labels and its mask.
-fn image_bytes(atlas: &Atlas) -> usize {
-    let image = &atlas.image;
-    let mask = if image.labels.iter().any(|label| label.masked) { image.texels.len() / 8 } else { 0 };
-    image.texels.len() + 2 * image.palette.len() + cubist_core::format::LABEL_BYTES * image.labels.len() + mask
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -354,6 +383,28 @@ mod tests {
         assert!(psnr(&large) >= psnr(&small) - 0.2, "{} {}", psnr(&large), psnr(&small));
         let Err(BakeError::Budget { budget: 500, smallest }) = bake(500) else { panic!("500 bytes cannot hold a scene") };
         assert!((500..6_000).contains(&smallest), "{smallest}");
+    }
+
+    #[test]
+    fn a_picture_is_packed_where_it_does_not_fit_raw() {
+        let scene = small("street");
+        let bake = |goal, storage| {
+            let options = Options { goal, storage, truth: TruthFrames::All, ..Options::default() };
+            bake_scene(&scene, &options, &|_, _| {}).unwrap()
+        };
+        let (plain, _) = bake(Goal::AsSet, None);
+        let tight = Goal::Budget(plain.len() as u64 * 6 / 10);
+        let told = |report: &crate::Report| report.warnings.iter().any(|warning| warning.contains("--storage raw"));
+        let (bytes, open) = bake(tight, None);
+        assert!(bytes.len() <= plain.len() * 6 / 10 && open.source_image.storage == Storage::Packed && told(&open), "{:?}", open.warnings);
+        assert!(open.memory.picture == open.source_image.raw_bytes && open.source_image.stored_bytes < open.source_image.raw_bytes);
+        let (_, raw) = bake(tight, Some(Storage::Raw));
+        assert!(raw.source_image.storage == Storage::Raw && raw.memory.picture == 0 && !told(&raw));
+        let psnr = |report: &crate::Report| report.quality_vs_truth.unwrap().psnr_mean;
+        assert!(psnr(&open) > psnr(&raw), "{} {}", psnr(&open), psnr(&raw));
+        // Where there is room, flash is where the picture stays.
+        let (_, wide) = bake(Goal::Budget(plain.len() as u64 * 4), None);
+        assert!(wide.source_image.storage == Storage::Raw && !told(&wide));
     }
 
     #[test]

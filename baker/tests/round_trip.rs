@@ -1,6 +1,6 @@
 //! From a G-buffer to bytes to pixels: two sheets, one moving in front of the other.
 
-use cubist_baker::atlas::{Label, SourceImage};
+use cubist_baker::atlas::{Label, SourceImage, Storage};
 use cubist_baker::bake::Coverage;
 use cubist_baker::encode::{self, CodingSettings, Content, Exceeded, Header};
 use cubist_baker::gbuffer::GBuffer;
@@ -59,7 +59,7 @@ fn bake_every(interval: u32, gbuffer: &GBuffer, image: &SourceImage, looping: bo
     order::sort(&evidence, &mut sheets);
     let settings = CodingSettings { step_log2: 0, lambda: 0.0, independent_every };
     let content = Content { grid: &grid, image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields, planes: &[], cameras: &[] };
-    encode::bundle(&content, settings, Header { fps: 30, info: "two sheets" }).expect("it fits")
+    encode::bundle(&content, settings, Header { storage: Storage::Raw, fps: 30, info: "two sheets" }).expect("it fits")
 }
 
 fn play(bytes: &[u8], frames: impl Iterator<Item = u32>) -> Vec<Vec<u16>> {
@@ -150,7 +150,8 @@ fn more_layers_than_a_key_can_have_are_an_error_with_a_cure() {
     let settings = CodingSettings { step_log2: 0, lambda: 0.0, independent_every: 1 };
     let content =
         Content { grid: &grid, image: &image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields, planes: &[], cameras: &[] };
-    let error = encode::bundle(&content, settings, Header { fps: 30, info: "" }).expect_err("more than 16 bits can say");
+    let error =
+        encode::bundle(&content, settings, Header { storage: Storage::Raw, fps: 30, info: "" }).expect_err("more than 16 bits can say");
     assert!(matches!(error, Exceeded { what: "layers in a key", found: 66_049, most: 65_535, .. }), "{error:?}");
     assert!(error.to_string().contains("--cell"), "{error}");
 }

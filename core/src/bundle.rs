@@ -6,7 +6,7 @@ use crate::atlas::Texture;
 use crate::fixed::KEY_BITS;
 use crate::format::{
     self, ATLAS, Atlas, Envelope, FIXED, INFO, KEY_BYTES, KNOWN_FLAGS, KeyEntry, LABEL_BYTES, LABELS, LabelRecord, MAGIC, MASK, MASKED,
-    MAX_SECTIONS, MAX_SHEETS, PATH, Path, SPACE_CUBIC, Section, TIME_CUBIC, VERSION,
+    MAX_SECTIONS, MAX_SHEETS, PACKED, PATH, Path, RAW, SPACE_CUBIC, Section, TIME_CUBIC, VERSION,
 };
 use crate::grid::Grid;
 use crate::plane::{CAMERA_BYTES, Camera, PLANE_BYTES};
@@ -169,9 +169,28 @@ impl<'a> Bundle<'a> {
         Grid::new(self.path.width, self.path.height, self.path.cell_log2)
     }
 
+    /// Texels of the source image.
+    #[must_use]
+    pub fn texel_count(&self) -> usize {
+        usize::from(self.atlas.height) << self.atlas.width_log2
+    }
+
+    /// Whether there is a mask: a label asks for one.
+    #[must_use]
+    pub fn masked(&self) -> bool {
+        self.labels.iter().any(|label| LabelRecord::from_bytes(label).flags & MASKED != 0)
+    }
+
+    /// The coded mask and texels of a bundle that holds them packed; `None`: they are raw.
+    #[must_use]
+    pub fn packed(&self) -> Option<&'a [u8]> {
+        (self.atlas.encoding == PACKED).then_some(self.atlas.texels)
+    }
+
+    /// The source image as far as it is borrowed: where it is packed, its size alone.
     pub(crate) fn texture(&self) -> Texture<'a> {
         Texture {
-            texels: self.atlas.texels,
+            texels: if self.packed().is_some() { &[] } else { self.atlas.texels },
             mask: self.mask,
             width_log2: u32::from(self.atlas.width_log2),
             height: u32::from(self.atlas.height),
@@ -202,8 +221,10 @@ fn length(expected: usize, found: usize, name: &'static str) -> Result<(), Bundl
 fn check_atlas(atlas: &Atlas<'_>) -> Result<(), BundleError> {
     field((4..=10).contains(&atlas.width_log2), "ATLS width_log2", u32::from(atlas.width_log2))?;
     field((1..=1024).contains(&atlas.height), "ATLS height", u32::from(atlas.height))?;
-    field(atlas.encoding == 0, "ATLS encoding", u32::from(atlas.encoding))?;
-    length(usize::from(atlas.height) << atlas.width_log2, atlas.texels.len(), "ATLS texels")?;
+    field(atlas.encoding <= PACKED, "ATLS encoding", u32::from(atlas.encoding))?;
+    if atlas.encoding == RAW {
+        length(usize::from(atlas.height) << atlas.width_log2, atlas.texels.len(), "ATLS texels")?;
+    }
     let entries = atlas.palette.len() / 2;
     field((1..=256).contains(&entries) && atlas.palette.len().is_multiple_of(2), "ATLS palette bytes", atlas.palette.len() as u32)
 }
@@ -218,7 +239,8 @@ fn check_labels<'a>(labels: &[[u8; LABEL_BYTES]], atlas: &Atlas<'_>, mask: &'a [
         masked |= label.flags & MASKED != 0;
         field(label.flags & (MASKED | FIXED) != MASKED | FIXED, "LABL flags", u32::from(label.flags))?;
     }
-    if !masked {
+    // A packed picture brings its mask along.
+    if !masked || atlas.encoding == PACKED {
         return Ok(&[]);
     }
     length((usize::from(atlas.height) << atlas.width_log2) / 8, mask.len(), "MASK")?;

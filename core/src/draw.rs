@@ -98,8 +98,8 @@ impl<'d, 'a> Drawing<'d, 'a> {
     where
         'a: 'd,
     {
-        let Workspace { rows: [_, top, bottom, _], halfway, sheets, plan, palette, .. } = space;
-        let site = Site { bundle, rows: [top, halfway, bottom], sheets };
+        let Workspace { texture, rows: [_, top, bottom, _], halfway, sheets, plan, palette, .. } = space;
+        let site = Site { bundle, texture: *texture, rows: [top, halfway, bottom], sheets };
         (Self { site, plan }, palette)
     }
 
@@ -264,7 +264,7 @@ fn block<P: Paint, const EIGHT: bool>(
 ) {
     let (log2, cell) = if EIGHT { (2, 3) } else { (site.log2(), site.bundle.grid().log2) };
     let row = y & (1u32 << log2).wrapping_sub(1);
-    let texture = site.bundle.texture();
+    let texture = site.texture;
     let block = if EIGHT { site.quarter(mixed.block.into(), y >> log2) } else { site.block(mixed.block.into(), y >> log2) };
     let mut left = u32::MAX.wrapping_shr(32u32.wrapping_sub(pixels.len() as u32));
     let mut sheets = mixed.sheets;

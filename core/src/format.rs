@@ -49,6 +49,11 @@ pub struct Section<'a> {
     pub bytes: &'a [u8],
 }
 
+/// [`Atlas::encoding`]: one palette index a texel, and the mask in a section of its own. Both are borrowed where they lie.
+pub const RAW: u8 = 0;
+/// [`Atlas::encoding`]: mask and texels coded as [`crate::pack`] says, and unpacked into the caller's memory.
+pub const PACKED: u8 = 1;
+
 /// The source image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Atlas<'a> {
@@ -56,11 +61,11 @@ pub struct Atlas<'a> {
     pub width_log2: u8,
     /// Rows, 1..=1024.
     pub height: u16,
-    /// 0: one palette index a texel.
+    /// [`RAW`] or [`PACKED`].
     pub encoding: u8,
     /// RGB565, little-endian, at most 256 entries.
     pub palette: &'a [u8],
-    /// Row by row, from the top.
+    /// Row by row, from the top; packed: the coded mask and texels.
     pub texels: &'a [u8],
 }
 

@@ -68,12 +68,15 @@
 //! the place of the oldest. A seek to any other place decodes from the last independent key before it, unless going on from where
 //! the ring stands takes fewer keys. On a looping path the first key follows the last, so that the ring simply goes on.
 //!
+//! The source image's texels are read where the bundle lies, in flash, or, where the bundle holds them packed ([`pack`]), from the
+//! caller's memory, where [`Player::new`] unpacks them.
+//!
 //! # What holds
 //!
 //! The crate is `no_std`, without alloc, without floating point, without unsafe code; no input makes it panic. A frame is a
 //! function of the bundle and the frame number alone, whatever was shown before. The bytes are described in FORMAT.md.
-//! The same description of the records serves the baker's encoder, which is why [`coder`], [`lists`], [`nodes`] and
-//! [`record`] are public.
+//! The same description of records and packed pictures serves the baker's encoder, which is why [`coder`], [`lists`], [`nodes`],
+//! [`record`] and [`pack`] are public.
 #![no_std]
 #![deny(
     clippy::indexing_slicing,
@@ -99,6 +102,7 @@ pub mod key;
 pub mod lists;
 mod memory;
 pub mod nodes;
+pub mod pack;
 mod plan;
 pub mod plane;
 mod player;

@@ -2,10 +2,13 @@
 //! One function says both, so that they cannot disagree.
 
 use crate::Bundle;
+use crate::atlas::Texture;
+use crate::coder::{Decoder, Probability};
 use crate::format::{self, SPACE_CUBIC};
 use crate::key::Key;
 use crate::lists::{self, Lists};
 use crate::nodes;
+use crate::pack::{self, Picture, Recent};
 use crate::plan::{Edge, Mixed, Plan, Run};
 use crate::record::Stream;
 use crate::row::{Layer, NodeRow};
@@ -15,6 +18,8 @@ use bytemuck::Pod;
 /// The caller's memory, cut up.
 #[derive(Debug)]
 pub struct Workspace<'m> {
+    /// The source image: the bundle's own, or unpacked.
+    pub texture: Texture<'m>,
     /// The source image's palette in the display's byte order.
     pub palette: &'m mut [u16],
     /// The keys, and what they are decoded with.
@@ -34,9 +39,20 @@ pub struct Workspace<'m> {
 struct Cutter<'m> {
     rest: &'m mut [u32],
     words: usize,
+    /// Words that unpacking reaches to, which is over before what is cut off later is used.
+    unpacking: usize,
 }
 
 impl<'m> Cutter<'m> {
+    fn new(rest: &'m mut [u32]) -> Self {
+        Self { rest, words: 0, unpacking: 0 }
+    }
+
+    /// Words in all.
+    fn needed(&self) -> usize {
+        self.words.max(self.unpacking)
+    }
+
     fn take<T: Pod>(&mut self, count: usize) -> &'m mut [T] {
         let bytes = count.saturating_mul(size_of::<T>());
         let words = bytes.div_ceil(4);
@@ -49,7 +65,24 @@ impl<'m> Cutter<'m> {
     }
 }
 
-fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
+/// The source image: a packed one is unpacked here.
+// Rarely called and long: in one place, whoever cuts memory.
+#[inline(never)]
+fn picture<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>) -> Texture<'m> {
+    let texture = bundle.texture();
+    let Some(packed) = bundle.packed() else { return texture };
+    let texels = cutter.take(bundle.texel_count());
+    let mask = cutter.take(if bundle.masked() { bundle.texel_count() / 8 } else { 0 });
+    // What unpacking needs lies where playback's own memory will.
+    let mut rest = Cutter { rest: &mut *cutter.rest, words: cutter.words, unpacking: 0 };
+    let (contexts, recent) = (rest.take::<Probability>(pack::CONTEXTS), rest.take::<Recent>(pack::INDICES));
+    cutter.unpacking = rest.words;
+    // Where memory is only counted, there is none: nothing is unpacked.
+    pack::code(&mut Decoder::new(packed), contexts, recent, &mut Picture { width_log2: texture.width_log2, texels, mask });
+    Texture { texels, mask, ..texture }
+}
+
+fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
     let (grid, limits) = (bundle.grid(), bundle.limits());
     let (key_layers, row_layers) = (usize::from(limits.key_layers), usize::from(limits.row_layers));
     let (back, ahead) = format::reach(bundle.path().time);
@@ -72,6 +105,7 @@ fn cut<'m>(bundle: &Bundle<'_>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
         }
     };
     Workspace {
+        texture: picture(bundle, cutter),
         palette: cutter.take(256),
         stream: Stream {
             list_contexts: cutter.take(lists::CONTEXTS),
@@ -122,17 +156,17 @@ impl Bundle<'_> {
     /// Bytes of working memory that a player of this bundle asks for, at any alignment.
     #[must_use]
     pub fn memory_needed(&self) -> usize {
-        let mut counter = Cutter { rest: &mut [], words: 0 };
+        let mut counter = Cutter::new(&mut []);
         let _ = cut(self, &mut counter);
-        counter.words.saturating_mul(4).saturating_add(3)
+        counter.needed().saturating_mul(4).saturating_add(3)
     }
 }
 
 /// `memory` cut up for `bundle`; `None` where it is too small.
-pub fn workspace<'m>(bundle: &Bundle<'_>, memory: &'m mut [u8]) -> Option<Workspace<'m>> {
+pub fn workspace<'m>(bundle: &Bundle<'m>, memory: &'m mut [u8]) -> Option<Workspace<'m>> {
     let (_, words, _) = bytemuck::pod_align_to_mut::<u8, u32>(memory);
     let given = words.len();
-    let mut cutter = Cutter { rest: words, words: 0 };
+    let mut cutter = Cutter::new(words);
     let workspace = cut(bundle, &mut cutter);
-    (cutter.words <= given).then_some(workspace)
+    (cutter.needed() <= given).then_some(workspace)
 }

@@ -5,6 +5,7 @@
 //! positions lie in a **window** of the source image, so many rows of it that a position there is one 32-bit number.
 
 use crate::Bundle;
+use crate::atlas::Texture;
 use crate::coverage::{Chart, Cover};
 use crate::fixed::PlayUv;
 use crate::format::{MAX_SHEETS, SPACE_CUBIC, STRIP};
@@ -150,8 +151,10 @@ pub struct Plan<'m> {
 /// What a plan is made of.
 #[derive(Clone, Copy, Debug)]
 pub struct Site<'s, 'a, 'm> {
-    /// Labels, screen, source image.
+    /// Labels, screen, the source image's size.
     pub bundle: &'s Bundle<'a>,
+    /// The source image.
+    pub texture: Texture<'m>,
     /// The rows of nodes around the row of cells.
     pub rows: Rows<'s, 'm>,
     /// Its sheets.

@@ -245,7 +245,7 @@ impl<'a> Player<'a> {
         if !self.ready(y) {
             return None;
         }
-        let texture = self.bundle.texture();
+        let texture = self.space.texture;
         let (drawing, palette) = Drawing::new(self.bundle, &mut self.space);
         Some((drawing, &mut self.work, Colours { texture, palette: palette.try_into().ok()? }))
     }

@@ -1,6 +1,7 @@
 //! Hostile bundles: whatever the bytes, parsing refuses them or the player plays something: no panic, every pixel written, the
 //! same pixels whatever the memory held. First layer: cuts, changed bytes, changed fields; what a fuzzer finds comes on top.
 
+use cubist_baker::atlas::Storage;
 use cubist_baker::bake::Settings;
 use cubist_core::coder::{Bits, Probability};
 use cubist_core::format::{
@@ -34,6 +35,26 @@ fn sound() -> &'static [u8] {
         assert!((0..bundle.key_count()).any(|key| !bundle.key(key).independent), "dependent keys belong to the test");
         bytes
     })
+}
+
+/// The same bundle with its source image packed.
+fn packed() -> &'static [u8] {
+    static BYTES: OnceLock<Vec<u8>> = OnceLock::new();
+    BYTES.get_or_init(|| {
+        let mut settings = Settings { cell: 8, key_interval: 2, ..Settings::default() };
+        (settings.atlas.max_side, settings.atlas.storage) = (64, Storage::Packed);
+        scenes::bundle("street", [52, 39], 9, &settings).expect("a built-in scene bakes")
+    })
+}
+
+/// The source image of [`packed`].
+fn packed_atlas() -> Atlas<'static> {
+    *Bundle::parse(packed()).expect("sound").atlas()
+}
+
+/// The packed bundle with `atlas` in place of its own.
+fn with_atlas(atlas: &Atlas<'_>) -> Vec<u8> {
+    with_section(packed(), ATLAS, &postcard::to_stdvec(atlas).expect("an atlas serialises"))
 }
 
 /// Puts the checksum right.
@@ -447,6 +468,51 @@ fn unknown_sections_are_skipped_unless_required() {
     let error = Bundle::parse(&add(true)).err();
     assert_eq!(error, Some(BundleError::UnknownSection { tag: *b"NEWS" }));
     assert!(error.expect("an error").to_string().contains("\"NEWS\""), "it is refused by name");
+}
+
+#[test]
+fn packed_pictures_play_whatever_their_bytes() {
+    assert!(play(packed(), 0, 0) == play(sound(), 0, 0));
+    let (mut random, atlas) = (Random(7), packed_atlas());
+    for round in 0..400 {
+        let mut texels = atlas.texels.to_vec();
+        match round % 4 {
+            // Cut short: the rest is zeros.
+            0 => texels.truncate(random.below(texels.len() + 1)),
+            1 => texels.fill([0, 0xff, 0x80, 0x55][random.below(4)]),
+            _ => {
+                let whole = 0..texels.len();
+                mutate(&mut texels, whole, &mut random);
+            }
+        }
+        assert!(survives(&with_atlas(&Atlas { texels: &texels, ..atlas })), "any packed picture is a picture");
+    }
+}
+
+#[test]
+fn packed_pictures_of_any_size_ask_for_what_they_take() {
+    let atlas = packed_atlas();
+    for (width_log2, height) in [(4, 1), (4, 1024), (6, 63), (10, 1), (10, 1024), (7, 64)] {
+        for flags in [0, MASKED, FIXED] {
+            let label = LabelRecord { right: 9, bottom: 1, flags, ..LabelRecord::default() }.to_bytes();
+            let bytes = with_atlas(&Atlas { width_log2, height, ..atlas });
+            let bytes = with_section(&bytes, LABELS, &label);
+            assert!(survives(&bytes), "{width_log2} {height} {flags}");
+            let needed = Bundle::parse(&bytes).expect("it played").memory_needed();
+            let count = usize::from(height) << width_log2;
+            assert!(needed >= count + if flags == MASKED { count / 8 } else { 0 });
+        }
+    }
+    // Where playback needs next to nothing, unpacking still has its room.
+    let path: Path<'_> = postcard::from_bytes(section(PATH)).expect("a sound path");
+    let limits = Limits { cell_sheets: 1, seek_keys: path.limits.seek_keys, ..Limits::default() };
+    let path = Path { width: 1, height: 1, limits, ..path };
+    let bytes = with_section(packed(), PATH, &postcard::to_stdvec(&path).expect("a path serialises"));
+    assert!(survives(&bytes));
+    for encoding in [2, 3, 0xff] {
+        let error = Bundle::parse(&with_atlas(&Atlas { encoding, ..atlas })).err();
+        assert_eq!(error, Some(BundleError::Field { name: "ATLS encoding", found: encoding.into() }));
+    }
 }
 
 #[test]

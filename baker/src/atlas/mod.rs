@@ -10,6 +10,7 @@ use crate::gbuffer::{BACKGROUND, GBuffer, Hits};
 use crate::scene::{Background, Scene};
 use crate::shade::Shader;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use thiserror::Error;
@@ -43,6 +44,28 @@ pub enum AtlasError {
     },
 }
 
+/// How a bundle holds its source image.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Storage {
+    /// A byte a texel: read from flash as it lies there, no memory.
+    #[default]
+    Raw,
+    /// Coded, for a smaller bundle: the player unpacks it into its memory, a byte a texel and an eighth for the mask.
+    Packed,
+}
+
+impl Storage {
+    /// What `--storage` calls it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Raw => "raw",
+            Self::Packed => "packed",
+        }
+    }
+}
+
 /// What may be chosen about the source image.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
@@ -52,11 +75,13 @@ pub struct Settings {
     pub density: f64,
     /// Palette entries, at most: 2..=256.
     pub colours: usize,
+    /// How the bundle holds it.
+    pub storage: Storage,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { max_side: 512, density: 1.0, colours: 256 }
+        Self { max_side: 512, density: 1.0, colours: 256, storage: Storage::Raw }
     }
 }
 

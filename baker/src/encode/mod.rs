@@ -2,16 +2,18 @@
 //! The stream is described by `cubist_core::record`; this drives it and keeps the bounds it states.
 
 mod limits;
+mod picture;
 mod range;
 
-use crate::atlas::SourceImage;
+use crate::atlas::{SourceImage, Storage};
 use crate::fields::Fields;
 use crate::fit::Fit;
 use crate::sheets::{KeyGrid, Layers, Sheets};
 use cubist_core::coder::Probability;
 use cubist_core::fixed::{KEY_MAX, KEY_MIN, field_code};
 use cubist_core::format::{
-    ATLAS, Atlas, Envelope, FIXED, INFO, KeyEntry, LABELS, LabelRecord, Limits, MAGIC, MASK, MASKED, PATH, Path, STRIP, Section, VERSION,
+    ATLAS, Atlas, Envelope, FIXED, INFO, KeyEntry, LABELS, LabelRecord, Limits, MAGIC, MASK, MASKED, PACKED, PATH, Path, RAW, STRIP,
+    Section, VERSION,
 };
 use cubist_core::key::{Key, Source};
 use cubist_core::lists::{self, Lists};
@@ -19,6 +21,7 @@ use cubist_core::nodes::{self, Trace};
 use cubist_core::plane::{CAMERA_BYTES, Camera, PLANE_BYTES, Plane, View};
 use cubist_core::record::{LISTS, MAX_KEYS, Place, Shape, Stream};
 pub use limits::Exceeded;
+pub use picture::{image_bytes, packed, raw_bytes, unpacked};
 use range::Encoder;
 
 /// How keys are coded.
@@ -36,6 +39,8 @@ pub struct CodingSettings {
 /// What goes into a bundle besides the keys.
 #[derive(Clone, Copy, Debug)]
 pub struct Header<'a> {
+    /// How the source image is stored.
+    pub storage: Storage,
     /// Frames per second.
     pub fps: u16,
     /// A text for people.
@@ -96,20 +101,19 @@ pub fn bundle(content: &Content<'_>, settings: CodingSettings, header: Header<'_
         records: &records,
     };
     let palette: Vec<u8> = image.palette.iter().flat_map(|&colour| rgb565(colour).to_le_bytes()).collect();
-    let atlas = Atlas {
-        width_log2: image.width.trailing_zeros() as u8,
-        height: image.height as u16,
-        encoding: 0,
-        palette: &palette,
-        texels: &image.texels,
+    let (encoding, texels) = match header.storage {
+        Storage::Raw => (RAW, image.texels.clone()),
+        Storage::Packed => (PACKED, packed(image)),
     };
-    let masked = image.labels.iter().any(|label| label.masked);
-    let mask: Vec<u8> = if masked { image.covered.chunks(8).map(bits).collect() } else { Vec::new() };
+    let atlas =
+        Atlas { width_log2: image.width.trailing_zeros() as u8, height: image.height as u16, encoding, palette: &palette, texels: &texels };
+    let mask = picture::mask(image);
     let label_bytes: Vec<u8> = labels.iter().flat_map(|label| label.to_bytes()).collect();
     let (path, atlas) = (postcard_bytes(&path), postcard_bytes(&atlas));
     let section = |tag, required, bytes| Section { tag, required, bytes };
     let mut sections = vec![section(PATH, true, &path[..]), section(ATLAS, true, &atlas), section(LABELS, true, &label_bytes)];
-    if masked {
+    // A packed picture brings its mask along.
+    if !mask.is_empty() && header.storage == Storage::Raw {
         sections.push(section(MASK, true, &mask));
     }
     if !header.info.is_empty() {
@@ -130,11 +134,6 @@ fn postcard_bytes<T: serde::Serialize>(value: &T) -> Vec<u8> {
 #[must_use]
 pub fn rgb565([r, g, b]: [u8; 3]) -> u16 {
     u16::from(r >> 3) << 11 | u16::from(g >> 2) << 5 | u16::from(b >> 3)
-}
-
-/// Eight flags in a byte, the first in the lowest bit.
-fn bits(flags: &[bool]) -> u8 {
-    flags.iter().enumerate().fold(0, |byte, (at, &flag)| byte | u8::from(flag) << at)
 }
 
 /// Fraction bits of coordinates: the finest that leave as much room beside the picture as it is wide, half of it on either side.

@@ -1,0 +1,213 @@
+//! Packed pictures: how a source image's mask and texels are coded, in one description for decoder and encoder alike. Bits come from
+//! (or go to) `coder`, texels and mask lie in the caller's memory; `memory` unpacks there what the bundle holds packed, once.
+//!
+//! Most texels are what one beside them is; of the others most are what was seen before below the same texel; the rest are spelt out,
+//! bit by bit, near what the texels around them would go on to. How likely each is follows from how much those agree.
+
+use crate::coder::{Bits, Probability};
+use heapless::Vec;
+
+/// Texels that were last seen below one of a certain index, the latest first.
+pub type Recent = [u8; WAYS];
+/// Texels in a [`Recent`].
+pub const WAYS: usize = 8;
+/// How many [`Recent`]s coding takes: one for every index.
+pub const INDICES: usize = 256;
+/// Contexts that coding takes.
+pub const CONTEXTS: usize = SAME + AGAIN + SPELT;
+
+/// Neighbours that a texel is compared with.
+const PLACES: usize = 4;
+/// How much the neighbours differ: classes.
+const ACTIVITIES: usize = 4;
+/// Contexts of "the same as a neighbour": by which neighbours are equal, activity, which of them it is, and whether the texel is covered.
+const SAME: usize = 64 * ACTIVITIES * PLACES * 2;
+/// Contexts of "seen here before": by the number of those asked about, activity, covered.
+const AGAIN: usize = WAYS * ACTIVITIES * 2;
+/// Bits of an index's prediction that spelling it out depends on.
+const SPELT_BITS: u32 = 3;
+/// Contexts of spelling out: a tree of the bits above for each prediction.
+const SPELT: usize = INDICES << SPELT_BITS;
+
+/// A picture as it is coded: an encoder finds here what to code, a decoder leaves here what it read.
+#[derive(Debug)]
+pub struct Picture<'p> {
+    /// A row is 2^this texels.
+    pub width_log2: u32,
+    /// One palette index a texel, row by row.
+    pub texels: &'p mut [u8],
+    /// One bit a texel, least significant first: does it belong to a chart? Empty: all do.
+    pub mask: &'p mut [u8],
+}
+
+/// Codes `picture`, its mask first, in `contexts` ([`CONTEXTS`] of them) and `recent` ([`INDICES`] of them), whatever these hold.
+pub fn code<B: Bits>(bits: &mut B, contexts: &mut [Probability], recent: &mut [Recent], picture: &mut Picture<'_>) {
+    contexts.fill(Probability::NEW);
+    code_mask(bits, contexts, picture);
+    contexts.fill(Probability::NEW);
+    recent.fill([0; WAYS]);
+    let Some((same, rest)) = contexts.split_at_mut_checked(SAME) else { return };
+    let Some((again, spelt)) = rest.split_at_mut_checked(AGAIN) else { return };
+    let mut models = Models { same, again, spelt, recent };
+    let Picture { width_log2, texels, mask } = picture;
+    let width = 1usize.wrapping_shl(*width_log2);
+    for row in 0..texels.len().wrapping_shr(*width_log2) {
+        let start = row.wrapping_shl(*width_log2);
+        let Some((done, own)) = texels.split_at_mut_checked(start) else { return };
+        // Rows that are not there are empty.
+        let above = |rows: usize| done.get(start.wrapping_sub(width.wrapping_mul(rows))..).unwrap_or(&[]);
+        let covered = mask.get(start >> 3..).unwrap_or(&[]);
+        models.row(bits, own.get_mut(..width).unwrap_or(&mut []), above(1), above(2), covered);
+    }
+}
+
+/// Codes a bit in one of `contexts`.
+#[inline]
+fn coded<B: Bits>(bits: &mut B, contexts: &mut [Probability], context: usize, bit: bool) -> bool {
+    contexts.get_mut(context).is_some_and(|context| bits.bit(context, bit))
+}
+
+/// Codes the mask: each bit by the two to its left, the five above these and the three above those.
+fn code_mask<B: Bits>(bits: &mut B, contexts: &mut [Probability], picture: &mut Picture<'_>) {
+    let bytes = 1usize.wrapping_shl(picture.width_log2) >> 3;
+    for row in 0..picture.mask.len().wrapping_mul(8).wrapping_shr(picture.width_log2) {
+        let start = row.wrapping_mul(bytes);
+        let Some((done, own)) = picture.mask.split_at_mut_checked(start) else { return };
+        // A row above; empty where there is none.
+        let above = |rows: usize| {
+            let from = start.wrapping_sub(bytes.wrapping_mul(rows));
+            done.get(from..from.wrapping_add(bytes)).unwrap_or(&[])
+        };
+        let (near, far) = (above(1), above(2));
+        let bit = |row: &[u8], column: usize| row.get(column >> 3).map_or(0, |byte| usize::from(byte >> (column & 7) & 1));
+        let (mut left, mut first, mut second) = (0usize, bit(near, 0) << 1 | bit(near, 1), bit(far, 0));
+        let mut column = 0usize;
+        for byte in own.iter_mut().take(bytes) {
+            let mut coming = *byte;
+            for _ in 0..8 {
+                first = (first << 1 | bit(near, column.wrapping_add(2))) & 31;
+                second = (second << 1 | bit(far, column.wrapping_add(1))) & 7;
+                let covered = coded(bits, contexts, second << 7 | first << 2 | left, coming & 1 == 1);
+                // What is coded comes in at the top as what is wanted goes out at the bottom.
+                coming = coming >> 1 | u8::from(covered) << 7;
+                left = (left << 1 | usize::from(covered)) & 3;
+                column = column.wrapping_add(1);
+            }
+            *byte = coming;
+        }
+    }
+}
+
+/// What is known around a texel.
+struct Around {
+    west: u8,
+    north: u8,
+    north_east: u8,
+    north_west: u8,
+    /// Which of them are equal: six bits.
+    agree: usize,
+    /// How much they differ.
+    activity: usize,
+    /// 1 if the texel belongs to a chart.
+    covered: usize,
+}
+
+impl Around {
+    /// Where the neighbours would go on to: a plane through them, kept between the least and the most of them.
+    fn onwards(&self) -> i32 {
+        let [west, north, corner] = [self.west, self.north, self.north_west].map(i32::from);
+        let (least, most) = (west.min(north).min(corner), west.max(north).max(corner));
+        west.wrapping_add(north).wrapping_sub(corner).max(least).min(most)
+    }
+}
+
+/// What coding texels learns.
+struct Models<'m> {
+    same: &'m mut [Probability],
+    again: &'m mut [Probability],
+    spelt: &'m mut [Probability],
+    recent: &'m mut [Recent],
+}
+
+impl Models<'_> {
+    /// Codes a row of texels; `above` and `second` begin with the rows above it, `mask` with its own bits. Any of them is empty where it is not there.
+    fn row<B: Bits>(&mut self, bits: &mut B, own: &mut [u8], above: &[u8], second: &[u8], mask: &[u8]) {
+        let mut mask = mask.iter();
+        let mut covered = 0u32;
+        let mut west = above.first().copied().unwrap_or(0);
+        let (mut west_west, mut corner) = (west, west);
+        // Row ends are where rows above end, whatever follows.
+        let above = above.get(..own.len()).unwrap_or(&[]);
+        for (column, texel) in own.iter_mut().enumerate() {
+            if column & 7 == 0 {
+                covered = mask.next().map_or(0xff, |&byte| u32::from(byte));
+            }
+            let north = above.get(column).copied().unwrap_or(west);
+            let north_west = if above.is_empty() { north } else { corner };
+            let north_east = above.get(column.wrapping_add(1)).copied().unwrap_or(north);
+            let north_north = second.get(column).copied().unwrap_or(north);
+            let pairs =
+                [(west, north), (north, north_west), (north_west, west), (north, north_east), (west, west_west), (north, north_north)];
+            let agree = pairs.iter().rev().fold(0, |bits, (a, b)| bits << 1 | usize::from(a == b));
+            let apart = |a: u8, b: u8| u32::from(a.abs_diff(b));
+            let activity = match apart(west, north_west).wrapping_add(apart(north, north_west)).wrapping_add(apart(north, north_east)) {
+                0..3 => 0,
+                3..10 => 1,
+                10..40 => 2,
+                _ => 3,
+            };
+            let around = Around { west, north, north_east, north_west, agree, activity, covered: covered as usize & 1 };
+            *texel = self.texel(bits, &around, *texel);
+            covered >>= 1;
+            west_west = if column == 0 { *texel } else { west };
+            (west, corner) = (*texel, north);
+        }
+    }
+
+    /// Codes one texel.
+    fn texel<B: Bits>(&mut self, bits: &mut B, around: &Around, wanted: u8) -> u8 {
+        let &Around { west, north, north_east, north_west, agree, activity, covered } = around;
+        let mut tried: Vec<u8, { PLACES + WAYS }> = Vec::new();
+        for (place, candidate) in [west, north, north_east, north_west].into_iter().enumerate() {
+            if tried.contains(&candidate) {
+                continue;
+            }
+            let context = ((agree << 2 | activity) << 2 | place) << 1 | covered;
+            if coded(bits, self.same, context, candidate == wanted) {
+                return candidate;
+            }
+            let _ = tried.push(candidate);
+        }
+        let mut none = [0; WAYS];
+        let recent = self.recent.get_mut(usize::from(north)).unwrap_or(&mut none);
+        let (mut found, mut rank) = (None, 0usize);
+        for &candidate in recent.iter() {
+            if tried.contains(&candidate) {
+                continue;
+            }
+            if coded(bits, self.again, (rank << 2 | activity) << 1 | covered, candidate == wanted) {
+                found = Some(candidate);
+                break;
+            }
+            let _ = tried.push(candidate);
+            rank = rank.wrapping_add(1);
+        }
+        let texel = found.unwrap_or_else(|| {
+            let tree = (around.onwards() as usize) >> (8u32.wrapping_sub(SPELT_BITS)) << 8;
+            let mut node = 1usize;
+            for shift in (0..8).rev() {
+                node = node << 1 | usize::from(coded(bits, self.spelt, tree | node, wanted >> shift & 1 == 1));
+            }
+            node as u8
+        });
+        // To the front, where it was left out of the way; what is last falls off where it was not there.
+        let mut moved = texel;
+        for slot in recent {
+            moved = core::mem::replace(slot, moved);
+            if moved == texel {
+                break;
+            }
+        }
+        texel
+    }
+}

@@ -1,0 +1,206 @@
+//! Packed source images: what a bundle that holds one plays, and what memory it takes, against the same scene's with a raw one.
+//! Scenes come from `scenes`, baked both ways; real pictures go through the packer and back.
+
+use cubist_baker::atlas::Storage;
+use cubist_baker::bake::{self, Flat, Settings};
+use cubist_baker::encode;
+use cubist_baker::inspect::Inspection;
+use cubist_core::format::{ATLAS, MASK};
+use cubist_core::{Bundle, Frame, MemoryError, Player};
+use cubist_tests::scenes;
+
+const SIZE: [u32; 2] = [104, 78];
+const FRAMES: u32 = 12;
+/// One with masks, one with charts of every size.
+const SCENES: [&str; 2] = ["street", "terrain"];
+
+/// A scene baked raw and packed.
+fn both(name: &str) -> (Flat, [Vec<u8>; 2]) {
+    let scene = scenes::reduced(name, SIZE, FRAMES).expect("a built-in scene");
+    let raw = Settings::default();
+    let flat = bake::flatten(&scene, &raw.atlas, &|_, _| {}).expect("it flattens");
+    let bundles = [Storage::Raw, Storage::Packed].map(|storage| {
+        let mut settings = raw;
+        settings.atlas.storage = storage;
+        bake::encode(&scene, &flat, &settings, &|_, _| {}).expect("it encodes").bundle
+    });
+    (flat, bundles)
+}
+
+/// All frames, plain and antialiased, from memory filled with `fill`.
+fn pixels(bytes: &[u8], fill: u8) -> Vec<u16> {
+    let bundle = Bundle::parse(bytes).expect("the baker's bytes parse");
+    let mut memory = vec![fill; bundle.memory_needed()];
+    let mut player = Player::new(&bundle, &mut memory).expect("the memory it asked for");
+    let mut out = Vec::new();
+    for frame in [0, 5, 6, 11, 2] {
+        player.seek(Frame(frame));
+        for y in 0..SIZE[1] {
+            let mut row = vec![0; SIZE[0] as usize];
+            player.row(y, &mut row);
+            out.extend(&row);
+            player.smooth_row(y, &mut row);
+            out.extend(&row);
+        }
+    }
+    out
+}
+
+#[test]
+fn packed_plays_the_pixels_of_raw() {
+    for name in SCENES {
+        let (flat, [raw, packed]) = both(name);
+        assert!(pixels(&raw, 0) == pixels(&packed, 0xa5), "{name}: other pixels");
+        let (raw_bundle, packed_bundle) = (Bundle::parse(&raw).expect("raw"), Bundle::parse(&packed).expect("packed"));
+        assert!(encode::unpacked(&raw_bundle) == encode::unpacked(&packed_bundle), "{name}: other texels or another mask");
+        assert!(encode::unpacked(&packed_bundle).0 == flat.atlas.image.texels, "{name}: other texels");
+        let (before, after) = (Inspection::of(&raw).expect("raw"), Inspection::of(&packed).expect("packed"));
+        let [was, is] = [&before, &after].map(|i| i.section_bytes(ATLAS) + i.section_bytes(MASK));
+        println!("{name}: {} -> {} bytes, image and mask {was} -> {is}", raw.len(), packed.len());
+        assert!(is * 2 < was, "{name}: {was} bytes became {is}");
+        assert!(before.section_bytes(MASK) > 0 && after.section_bytes(MASK) == 0, "{name}: the mask is in the picture");
+        assert_eq!(before.image.covered_texels, after.image.covered_texels);
+        // Unpacking itself needs no more than what playing has there later.
+        assert_eq!(after.workspace - before.workspace, after.unpacked_bytes(), "{name}");
+        assert_eq!(before.unpacked_bytes(), 0);
+        assert!(after.text().contains("packed") && before.text().contains("raw"));
+    }
+}
+
+#[test]
+fn the_document_says_how_to_unpack() {
+    for name in SCENES {
+        let (flat, [_, packed]) = both(name);
+        let bundle = Bundle::parse(&packed).expect("packed");
+        let (width, height) = (flat.atlas.image.width as i32, flat.atlas.image.height as i32);
+        let bytes = bundle.packed().expect("it is packed");
+        let (texels, mask) = Reader::new(bytes).picture(width, height);
+        assert!(texels == flat.atlas.image.texels, "{name}: other texels");
+        assert!(mask == flat.atlas.image.covered, "{name}: another mask");
+    }
+}
+
+/// Reads packed pictures by FORMAT.md's words alone.
+struct Reader<'b> {
+    bytes: &'b [u8],
+    range: u32,
+    code: u32,
+}
+
+/// p and n of a context.
+type Context = (u32, usize);
+const NEW: Context = (2048, 0);
+
+impl<'b> Reader<'b> {
+    fn new(bytes: &'b [u8]) -> Self {
+        let mut reader = Self { bytes, range: u32::MAX, code: 0 };
+        (0..4).for_each(|_| reader.shift());
+        reader
+    }
+
+    fn shift(&mut self) {
+        let (next, rest) = self.bytes.split_first().map_or((0, self.bytes), |(&next, rest)| (next, rest));
+        (self.code, self.bytes) = (self.code << 8 | u32::from(next), rest);
+    }
+
+    fn bit(&mut self, (p, n): &mut Context) -> bool {
+        let bound = (self.range >> 12) * (*p).clamp(32, 4064);
+        let bit = self.code >= bound;
+        let rate = [1, 2, 2, 3, 3, 3, 4, 4, 4, 4, 4, 5, 5, 5, 5, 5][*n];
+        if bit {
+            (self.code, self.range) = (self.code - bound, self.range - bound);
+            *p -= *p >> rate;
+        } else {
+            self.range = bound;
+            *p += (4095 - *p) >> rate;
+        }
+        *n = (*n + 1).min(15);
+        if self.range < 1 << 24 {
+            self.range <<= 8;
+            self.shift();
+        }
+        bit
+    }
+
+    /// Texels and mask of a picture with masked labels.
+    fn picture(&mut self, width: i32, height: i32) -> (Vec<u8>, Vec<bool>) {
+        let places = || (0..height).flat_map(move |y| (0..width).map(move |x| (x, y)));
+        let (mut contexts, mut mask) = (vec![NEW; 1024], Vec::new());
+        for (x, y) in places() {
+            let m = |i: i32, j: i32| {
+                let inside = (0..width).contains(&(x + i)) && y + j >= 0;
+                usize::from(inside && mask[((y + j) * width + x + i) as usize])
+            };
+            let own = 2 * m(-2, 0) + m(-1, 0);
+            let first = 16 * m(-2, -1) + 8 * m(-1, -1) + 4 * m(0, -1) + 2 * m(1, -1) + m(2, -1);
+            let second = 4 * m(-1, -2) + 2 * m(0, -2) + m(1, -2);
+            mask.push(self.bit(&mut contexts[128 * second + 4 * first + own]));
+        }
+        let (mut same, mut again, mut spelt) = (vec![NEW; 2048], vec![NEW; 64], vec![NEW; 2048]);
+        let mut recent = vec![vec![0u8; 8]; 256];
+        let mut texels: Vec<u8> = Vec::new();
+        for (x, y) in places() {
+            let t = |i: i32, j: i32| {
+                ((0..width).contains(&(x + i)) && y + j >= 0).then(|| i32::from(texels[((y + j) * width + x + i) as usize]))
+            };
+            let w = t(-1, 0).or(t(0, -1)).unwrap_or(0);
+            let n = t(0, -1).unwrap_or(w);
+            let (nw, ne, nn) = (t(-1, -1).unwrap_or(n), t(1, -1).unwrap_or(n), t(0, -2).unwrap_or(n));
+            let ww = t(-2, 0).unwrap_or(w);
+            let covered = usize::from(mask[(y * width + x) as usize]);
+            let equal = [w == n, n == nw, nw == w, n == ne, w == ww, n == nn];
+            let agree: usize = equal.iter().enumerate().map(|(k, &equal)| usize::from(equal) << k).sum();
+            let d = (w - nw).abs() + (n - nw).abs() + (n - ne).abs();
+            let activity = [3, 10, 40].iter().filter(|&&least| d >= least).count();
+            let mut tried = Vec::new();
+            let mut texel = None;
+            for (place, c) in [w, n, ne, nw].into_iter().enumerate() {
+                if texel.is_none() && !tried.contains(&c) {
+                    texel = self.bit(&mut same[((4 * agree + activity) * 4 + place) * 2 + covered]).then_some(c);
+                    tried.push(c);
+                }
+            }
+            if let Some(texel) = texel {
+                texels.push(texel as u8);
+                continue;
+            }
+            let mut rank = 0;
+            for c in recent[n as usize].iter().map(|&c| i32::from(c)) {
+                if texel.is_none() && !tried.contains(&c) {
+                    texel = self.bit(&mut again[(4 * rank + activity) * 2 + covered]).then_some(c);
+                    tried.push(c);
+                    rank += 1;
+                }
+            }
+            let texel = texel.unwrap_or_else(|| {
+                let g = (w + n - nw).clamp(w.min(n).min(nw), w.max(n).max(nw)) as usize >> 5;
+                let mut node = 1;
+                for _ in 0..8 {
+                    node = 2 * node + usize::from(self.bit(&mut spelt[256 * g + node]));
+                }
+                node as i32 - 256
+            }) as u8;
+            let list = &mut recent[n as usize];
+            list.remove(list.iter().position(|&c| c == texel).unwrap_or(7));
+            list.insert(0, texel);
+            texels.push(texel);
+        }
+        (texels, mask)
+    }
+}
+
+#[test]
+fn a_byte_less_than_it_takes_is_refused() {
+    let (_, bundles) = both("terrain");
+    for bytes in &bundles {
+        let bundle = Bundle::parse(bytes).expect("the baker's bytes parse");
+        let needed = bundle.memory_needed();
+        let mut memory = vec![0; needed - 1];
+        assert_eq!(Player::new(&bundle, &mut memory).err(), Some(MemoryError::TooSmall { needed, given: needed - 1 }));
+        // What is asked for is enough wherever it starts.
+        let mut memory = vec![0u8; needed + 8];
+        for start in 0..8 {
+            assert!(Player::new(&bundle, &mut memory[start..start + needed]).is_ok());
+        }
+    }
+}
