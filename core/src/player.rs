@@ -353,7 +353,12 @@ impl<'a> Player<'a> {
         }
         let mut coming = self.take_up(next);
         let frame = passed.saturating_add(1).min(length);
-        if self.work.keys < u32::from(self.bundle.limits().seek_keys) {
+        let full = self.work.keys >= u32::from(self.bundle.limits().seek_keys);
+        if full {
+            // A seek that has decoded as many keys as it may has no share of the frames before it.
+            coming.from = coming.from.max(passed.min(length));
+        }
+        if !full || frame < length {
             // Every frame has the same share, to the nearest slice; the last one does all that is left.
             let (frames, shares) = (frame.saturating_sub(coming.from), length.saturating_sub(coming.from));
             let due = coming.whole.saturating_mul(u64::from(frames)).checked_div(u64::from(shares)).unwrap_or(0);
