@@ -104,11 +104,14 @@ pub fn build(scene: &Scene, hits: &Hits, density: f64, max_side: u32) -> Chartin
         return charting;
     }
     let merging = merge::Merging::new(&faces, &links);
-    let candidates = CANDIDATES.map(|weights| {
+    let mut candidates: Vec<merge::Clusters> = Vec::new();
+    for weights in CANDIDATES {
         let mut clusters = merging.merge(weights);
         absorb::absorb(&faces, &links, &mut clusters, hits.samples.len());
-        clusters
-    });
+        if candidates.iter().all(|c| c.of != clusters.of) {
+            candidates.push(clusters);
+        }
+    }
     let mut charting = Charting { charts: Vec::new(), chart_of: Vec::new(), corners: Vec::new(), faces };
     let mut best: Option<(f64, Vec<u32>, Vec<Chart>)> = None;
     for clusters in candidates {
@@ -116,9 +119,6 @@ pub fn build(scene: &Scene, hits: &Hits, density: f64, max_side: u32) -> Chartin
         charting.charts = clusters.normals.iter().map(plane).collect();
         charting.chart_of = clusters.of;
         measure::measure(scene, hits, &mut charting, density, max_side);
-        if fold::split(hits, &mut charting, &links) {
-            measure::measure(scene, hits, &mut charting, density, max_side);
-        }
         let price = price::price(hits, &charting);
         if best.as_ref().is_none_or(|b| price < b.0) {
             best = Some((price, std::mem::take(&mut charting.chart_of), std::mem::take(&mut charting.charts)));
@@ -128,5 +128,8 @@ pub fn build(scene: &Scene, hits: &Hits, density: f64, max_side: u32) -> Chartin
         (charting.chart_of, charting.charts) = (chart_of, charts);
     }
     charting.flatten(scene);
+    if fold::split(hits, &mut charting, &links) {
+        measure::measure(scene, hits, &mut charting, density, max_side);
+    }
     charting
 }
