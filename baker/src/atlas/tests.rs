@@ -174,6 +174,14 @@ fn charts_are_injective() {
 }
 
 #[test]
+fn planes_are_charts_of_their_own_and_a_smooth_hill_is_one() {
+    let charts = |scene: Scene| made(&scene, &hits(&scene)).figures.charts;
+    // A quarter of a circle around a cube shows its top and three of its sides.
+    assert!((3..=4).contains(&charts(cube())), "{} charts", charts(cube()));
+    assert!(charts(hill()) <= 2, "{} charts", charts(hill()));
+}
+
+#[test]
 fn threads_do_not_matter() {
     let scene = hill();
     let on = |threads: usize| {

@@ -1,19 +1,15 @@
 //! Absorption: small clusters join a neighbour whose plane still shows them.
-//! Clusters come from `grow`; fewer of them go on to be measured.
+//! Clusters come from `merge`; fewer of them go on to be measured.
 
 use super::NONE;
-use super::grow::Clusters;
+use super::merge::Clusters;
 use super::observe::{Faces, Links};
 use std::collections::BTreeMap;
 
-/// A cluster seen by fewer pixels than this in 9.8 million (128 frames of 320x240) joins at grazing angles too.
+/// A cluster seen by fewer pixels than this in 9.8 million (128 frames of 320x240) joins another.
 const SMALL: f64 = 600.0 / 9.8e6;
-/// A cluster seen by less than this share of all pixels joins a larger neighbour that shows it well.
-const MEDIUM: f64 = 0.004;
-/// The least cosine between a small cluster's faces and the plane it joins.
+/// The least cosine between such a cluster's faces and the plane it joins.
 const GRAZING: f64 = 0.2;
-/// The same for a medium cluster.
-const FAIR: f64 = 0.45;
 /// The share of a cluster's hits that has to fit the plane it joins.
 const FITTING: f64 = 0.9;
 
@@ -36,39 +32,37 @@ pub(crate) fn absorb(faces: &Faces, links: &Links, clusters: &mut Clusters, samp
         hits[c as usize] += u64::from(faces.list[f].hits);
     }
     let mut parent: Vec<u32> = (0..count as u32).collect();
-    for (share, least) in [(SMALL, GRAZING), (MEDIUM, FAIR)] {
-        let limit = (share * samples as f64).max(8.0) as u64;
-        let mut order: Vec<u32> = (0..count as u32).filter(|&c| parent[c as usize] == c && hits[c as usize] < limit).collect();
-        order.sort_by_key(|&c| (hits[c as usize], c));
-        for c in order {
-            if hits[c as usize] >= limit {
-                continue;
-            }
-            let mut around: BTreeMap<u32, u64> = BTreeMap::new();
-            for &f in &members[c as usize] {
-                for &(g, weight) in links.of(f) {
-                    let other = root(&mut parent, clusters.of[g as usize]);
-                    if other != c {
-                        *around.entry(other).or_default() += u64::from(weight);
-                    }
+    let limit = (SMALL * samples as f64).max(8.0) as u64;
+    let mut order: Vec<u32> = (0..count as u32).filter(|&c| parent[c as usize] == c && hits[c as usize] < limit).collect();
+    order.sort_by_key(|&c| (hits[c as usize], c));
+    for c in order {
+        if hits[c as usize] >= limit {
+            continue;
+        }
+        let mut around: BTreeMap<u32, u64> = BTreeMap::new();
+        for &f in &members[c as usize] {
+            for &(g, weight) in links.of(f) {
+                let other = root(&mut parent, clusters.of[g as usize]);
+                if other != c {
+                    *around.entry(other).or_default() += u64::from(weight);
                 }
             }
-            let fitting = |plane: u32| {
-                let normal = clusters.normals[plane as usize];
-                let fits = |f: &&u32| faces.list[**f as usize].normal.dot(normal) > least;
-                let fit: u64 = members[c as usize].iter().filter(fits).map(|&f| u64::from(faces.list[f as usize].hits)).sum();
-                fit as f64 >= FITTING * hits[c as usize] as f64
-            };
-            // Into the neighbour with the longest seam; a medium cluster only into a larger one.
-            let mut candidates: Vec<(u64, u32)> = around.into_iter().map(|(c, w)| (w, c)).collect();
-            candidates.sort_by_key(|&(w, c)| (std::cmp::Reverse(w), c));
-            let target = candidates.into_iter().map(|(_, c)| c).find(|&t| hits[t as usize] >= hits[c as usize] && fitting(t));
-            if let Some(t) = target {
-                parent[c as usize] = t;
-                hits[t as usize] += hits[c as usize];
-                let moved = std::mem::take(&mut members[c as usize]);
-                members[t as usize].extend(moved);
-            }
+        }
+        let fitting = |plane: u32| {
+            let normal = clusters.normals[plane as usize];
+            let fits = |f: &&u32| faces.list[**f as usize].normal.dot(normal) > GRAZING;
+            let fit: u64 = members[c as usize].iter().filter(fits).map(|&f| u64::from(faces.list[f as usize].hits)).sum();
+            fit as f64 >= FITTING * hits[c as usize] as f64
+        };
+        // Into the neighbour with the longest seam.
+        let mut candidates: Vec<(u64, u32)> = around.into_iter().map(|(c, w)| (w, c)).collect();
+        candidates.sort_by_key(|&(w, c)| (std::cmp::Reverse(w), c));
+        let target = candidates.into_iter().map(|(_, c)| c).find(|&t| hits[t as usize] >= hits[c as usize] && fitting(t));
+        if let Some(t) = target {
+            parent[c as usize] = t;
+            hits[t as usize] += hits[c as usize];
+            let moved = std::mem::take(&mut members[c as usize]);
+            members[t as usize].extend(moved);
         }
     }
     let mut number = vec![NONE; count];

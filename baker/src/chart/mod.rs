@@ -2,22 +2,31 @@
 //! Samples come from the G-buffer; charts go to the atlas, which places and colours them.
 
 mod absorb;
+mod directions;
+mod flat;
 mod fold;
-mod grow;
 mod islands;
 mod labels;
 mod measure;
+mod merge;
 mod observe;
+mod price;
+mod refine;
 
 use crate::gbuffer::Hits;
 use crate::scene::Scene;
 use glam::DVec3;
+use merge::Weights;
 
 pub use labels::assign;
 pub(crate) use observe::Faces;
 
 /// Not a face, not a chart.
 pub(crate) const NONE: u32 = u32::MAX;
+
+/// The candidates: for smooth shapes, for many small planes, and for planes that meet in thin ones.
+const CANDIDATES: [Weights; 3] =
+    [Weights { bent: 0.002, wide: 8.0 }, Weights { bent: 0.006, wide: 8.0 }, Weights { bent: 0.003, wide: 0.01 }];
 
 /// How a chart is flattened.
 #[derive(Clone, Copy, Debug)]
@@ -94,17 +103,31 @@ pub fn build(scene: &Scene, hits: &Hits, density: f64, max_side: u32) -> Chartin
         charting.charts.iter_mut().for_each(|chart| chart.density *= density.min(1.0));
         return charting;
     }
-    let mut clusters = grow::grow(&faces, &links);
-    absorb::absorb(&faces, &links, &mut clusters, hits.samples.len());
-    let charts = clusters.normals.iter().map(|&n| Chart {
-        projection: Projection::Plane(measure::axes(n)),
-        density,
-        lo: [0.0; 2],
-        hi: [0.0; 2],
-        hits: 0,
-    });
-    let mut charting = Charting { charts: charts.collect(), chart_of: clusters.of, corners: Vec::new(), faces };
-    measure::measure(scene, hits, &mut charting, density, max_side);
+    let merging = merge::Merging::new(&faces, &links);
+    let mut candidates: Vec<merge::Clusters> = Vec::new();
+    for weights in CANDIDATES {
+        let mut clusters = merging.merge(weights);
+        absorb::absorb(&faces, &links, &mut clusters, hits.samples.len());
+        if candidates.iter().all(|c| c.of != clusters.of) {
+            candidates.push(clusters);
+        }
+    }
+    let mut charting = Charting { charts: Vec::new(), chart_of: Vec::new(), corners: Vec::new(), faces };
+    let mut best: Option<(f64, Vec<u32>, Vec<Chart>)> = None;
+    for clusters in candidates {
+        let plane = |&n: &DVec3| Chart { projection: Projection::Plane(measure::axes(n)), density, lo: [0.0; 2], hi: [0.0; 2], hits: 0 };
+        charting.charts = clusters.normals.iter().map(plane).collect();
+        charting.chart_of = clusters.of;
+        measure::measure(scene, hits, &mut charting, density, max_side);
+        let price = price::price(hits, &charting);
+        if best.as_ref().is_none_or(|b| price < b.0) {
+            best = Some((price, std::mem::take(&mut charting.chart_of), std::mem::take(&mut charting.charts)));
+        }
+    }
+    if let Some((_, chart_of, charts)) = best {
+        (charting.chart_of, charting.charts) = (chart_of, charts);
+    }
+    charting.flatten(scene);
     if fold::split(hits, &mut charting, &links) {
         measure::measure(scene, hits, &mut charting, density, max_side);
     }
