@@ -132,7 +132,8 @@ pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers
         let own = gbuffer.label[pixel] == u16::from(sheets.lists[index][sheet]);
         own.then(|| (gbuffer.uv[pixel], 1.0))
     };
-    let problem = Problem { grid, sheets, layers, time: grid.time, space: grid.space, prior: Some(prior), known: None, refit: robust, target };
+    let problem =
+        Problem { grid, sheets, layers, time: grid.time, space: grid.space, prior: Some(prior), known: None, refit: robust, target };
     let mut fit = solve_for(&problem);
     for _ in 0..REFITS {
         fit = solve_for(&Problem { known: Some(&fit.uv), target, ..problem });
