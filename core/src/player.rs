@@ -50,7 +50,12 @@ struct Coming<'a> {
     whole: u64,
     /// Frames of the interval that have no share in it.
     from: u32,
+    /// Shares that the seek that began it took beside its own.
+    lead: u32,
 }
+
+/// Shares of the next key that a jump takes beside its own: it decodes several keys anyway, and the first interval of a path may be short.
+const LEAD: u32 = 2;
 
 impl Coming<'_> {
     /// What is left to do: bytes of the record, and [`SLICE_COST`] a slice.
@@ -331,8 +336,9 @@ impl<'a> Player<'a> {
             };
             let place = bundle.place(key, run);
             let slices = place.slices(bundle.grid());
-            let coming = Coming { run, place, bits: Decoder::new(bundle.record(key)), slices, done: 0, whole: 0, from: 0 };
-            Coming { whole: coming.left(), ..coming }
+            let coming = Coming { run, place, bits: Decoder::new(bundle.record(key)), slices, done: 0, whole: 0, from: 0, lead: 0 };
+            let jumped = self.work.keys > 1 && self.work.keys < u32::from(bundle.limits().seek_keys);
+            Coming { whole: coming.left(), lead: if jumped { LEAD } else { 0 }, ..coming }
         })
     }
 
@@ -353,14 +359,10 @@ impl<'a> Player<'a> {
         }
         let mut coming = self.take_up(next);
         let frame = passed.saturating_add(1).min(length);
-        let full = self.work.keys >= u32::from(self.bundle.limits().seek_keys);
-        if full {
-            // A seek that has decoded as many keys as it may has no share of the frames before it.
-            coming.from = coming.from.max(passed.min(length));
-        }
-        if !full || frame < length {
+        if self.work.keys < u32::from(self.bundle.limits().seek_keys) {
             // Every frame has the same share, to the nearest slice; the last one does all that is left.
-            let (frames, shares) = (frame.saturating_sub(coming.from), length.saturating_sub(coming.from));
+            let share = |frame: u32| frame.saturating_sub(coming.from).saturating_add(coming.lead);
+            let (frames, shares) = (share(frame), share(length));
             let due = coming.whole.saturating_mul(u64::from(frames)).checked_div(u64::from(shares)).unwrap_or(0);
             let slice = coming.whole.checked_div(coming.slices as u64).unwrap_or(0);
             let rounded = if frames < shares { due.saturating_sub(slice >> 1) } else { due };
