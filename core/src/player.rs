@@ -55,7 +55,7 @@ struct Coming<'a> {
 }
 
 /// Shares of the next key that a jump takes beside its own: it decodes several keys anyway, and the first interval of a path may be short.
-const LEAD: u32 = 2;
+const LEAD: u32 = 3;
 
 impl Coming<'_> {
     /// What is left to do: bytes of the record, and [`SLICE_COST`] a slice.
