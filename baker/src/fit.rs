@@ -93,6 +93,9 @@ impl Sums {
 /// Where a layer is known to be, texels, and how sure that is, 0..=1; `None` where nothing is known.
 pub type Prior = Option<([f32; 2], f32)>;
 
+/// The target and weight of a pixel, given the value it has, its own target and its weight.
+pub type Refit = fn([f32; 2], [f32; 2], f32) -> ([f32; 2], f32);
+
 /// What one fit is about.
 pub struct Problem<'a, T> {
     /// The grid.
@@ -109,8 +112,8 @@ pub struct Problem<'a, T> {
     pub prior: Option<&'a [Prior]>,
     /// Values that a fit has already: pixels that are far from them count less. `None`: all count the same.
     pub known: Option<&'a [[f32; 2]]>,
-    /// What a fit after the first asks of a pixel, given what it has, the pixel's target and its weight.
-    pub refit: fn([f32; 2], [f32; 2], f32) -> ([f32; 2], f32),
+    /// What a fit after the first asks of a pixel.
+    pub refit: Refit,
     /// The target and weight of a G-buffer pixel for the sheet at a place in the list of its cell (interval times cells plus cell);
     /// `None`: the sheet does not care.
     pub target: T,
