@@ -35,8 +35,8 @@ const LOST: f32 = 3.0;
 pub struct Fields {
     /// Two distances a layer, pixels, as the player will have them.
     pub distance: Vec<[f32; 2]>,
-    /// Labels that are strips.
-    pub strip: Vec<bool>,
+    /// For every label whether it is a strip, and which way.
+    pub thin: Vec<Thin>,
 }
 
 /// The distances from a pixel to the nearest change between a sheet and what lies behind it: left, right, up, down, pixels;
@@ -50,17 +50,32 @@ pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers
     let outlines = Outlines { gbuffer, grid, sheets, layers, thin: &thin };
     let first = fit::solve_for(&outlines.problem(None, |index, sheet, pixel| outlines.target(index, sheet, pixel))).uv;
     let distance = outlines.refit(first, false);
-    Fields { distance, strip: thin.iter().map(|&thin| thin != Thin::No).collect() }
+    Fields { distance, thin }
 }
 
 impl Fields {
     /// Fits the fields once more, now that the tests are chosen: where charts tell, fields need not.
     #[must_use]
     pub fn settled(self, gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers) -> Self {
-        let thin = thin_labels(gbuffer, grid, sheets, self.strip.len());
-        let outlines = Outlines { gbuffer, grid, sheets, layers, thin: &thin };
-        Self { distance: outlines.refit(self.distance, true), ..self }
+        let outlines = Outlines { gbuffer, grid, sheets, layers, thin: &self.thin };
+        Self { distance: outlines.refit(self.distance, true), thin: self.thin }
     }
+
+    /// Whether a label is a strip.
+    #[must_use]
+    pub fn strip(&self, label: u8) -> bool {
+        self.thin[usize::from(label)] != Thin::No
+    }
+}
+
+/// The code of a distance, pixels.
+pub(crate) fn code(distance: f32) -> i8 {
+    field_code(libm::roundf(distance * 256.0) as i32)
+}
+
+/// The distance that a code stands for, pixels.
+pub(crate) fn distance(code: i8) -> f32 {
+    field_distance(code) as f32 / 256.0
 }
 
 /// Whether the sheet at a place in the list of a cell and interval is told by its fields.
@@ -93,8 +108,7 @@ impl<'a> Outlines<'a> {
         for _ in 0..REFITS {
             fields = fit::solve_for(&Outlines { ..*self }.problem(Some(&fields), target)).uv;
         }
-        let stored = |distance: f32| field_distance(field_code(libm::roundf(distance * 256.0) as i32)) as f32 / 256.0;
-        fields.iter().map(|pair| pair.map(stored)).collect()
+        fields.iter().map(|pair| pair.map(|field| distance(code(field)))).collect()
     }
 
     /// The target and weight of a pixel for the sheet at a place in the list of its cell and interval.
@@ -196,9 +210,12 @@ impl Look<'_> {
 
 /// Whether a label's runs of pixels are short, and along which axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Thin {
+pub enum Thin {
+    /// No: one field tells it.
     No,
+    /// Across: its sides are to the left and right.
     Across,
+    /// Down: its sides are above and below.
     Down,
 }
 

@@ -4,6 +4,7 @@
 
 use crate::atlas::Label;
 use crate::gbuffer::GBuffer;
+use crate::joins::root;
 use crate::sheets::KeyGrid;
 use crate::tears::{DOWN, NEXT, RIGHT};
 use rayon::prelude::*;
@@ -151,13 +152,6 @@ impl Block {
     fn parts(&self, gbuffer: &GBuffer, tears: &[u8], grid: &KeyGrid, least: u32) -> Vec<u32> {
         let pixels: Vec<usize> = self.pixels(grid).collect();
         let mut parent: Vec<u32> = (0..pixels.len() as u32).collect();
-        fn root(parent: &mut [u32], mut at: u32) -> u32 {
-            while parent[at as usize] != at {
-                parent[at as usize] = parent[parent[at as usize] as usize];
-                at = parent[at as usize];
-            }
-            at
-        }
         for (place, &pixel) in pixels.iter().enumerate() {
             for (bit, near, far) in self.steps(place) {
                 if tears[pixel] & bit == 0 && gbuffer.label[pixel] == gbuffer.label[pixel + far] {

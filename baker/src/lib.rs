@@ -15,6 +15,7 @@ pub mod folds;
 pub mod gbuffer;
 pub mod inspect;
 pub mod job;
+mod joins;
 pub mod metrics;
 pub mod order;
 pub mod patch;

@@ -129,7 +129,7 @@ fn observe(evidence: &Evidence<'_>, index: usize, list: &[u8]) -> Vec<Group> {
                 covering |= u32::from(covers(image, label, mix(&positions[place]))) << place;
                 if let Some((fields, distances)) = fields.zip(distances.as_ref()) {
                     let [a, b]: [f32; 2] = mix(&distances[place]);
-                    let inside = a > 0.0 && (!fields.strip[usize::from(label)] || b > 0.0);
+                    let inside = a > 0.0 && (!fields.strip(label) || b > 0.0);
                     covering |= u32::from(inside) << (16 + place);
                 }
             }

@@ -1,11 +1,11 @@
 //! Polish: the last word on outlines. Fields come from `fields`, fitted by distances and rounded to codes; here codes are moved by a step
 //! or two where that brings pixels to their side of an outline. One code at a time is set to the best of a few (coordinate descent).
 
-use crate::fields::{Fields, tests_field};
+use crate::fields::{Fields, code, distance, tests_field};
 use crate::gbuffer::GBuffer;
 use crate::patch::{self, Patch};
 use crate::sheets::{KeyGrid, Layers, Sheets, bilinear};
-use cubist_core::fixed::{MAX_FIELD, field_code, field_distance};
+use cubist_core::fixed::MAX_FIELD;
 use cubist_core::format::{SPACE_LINEAR, TIME_LINEAR};
 use rayon::prelude::*;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -67,10 +67,6 @@ pub fn polish(fields: Fields, gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets
     Fields { distance, ..fields }
 }
 
-fn distance(code: i8) -> f32 {
-    field_distance(code) as f32 / 256.0
-}
-
 struct Work<'a> {
     grid: &'a KeyGrid,
     /// The shares of a cell's corners in the field at each of its places.
@@ -85,7 +81,7 @@ struct Work<'a> {
 
 impl<'a> Work<'a> {
     fn new(fields: &Fields, gbuffer: &GBuffer, grid: &'a KeyGrid, sheets: &Sheets, layers: &Layers) -> Self {
-        let codes = fields.distance.iter().map(|pair| field_code(libm::roundf(pair[0] * 256.0) as i32)).collect();
+        let codes = fields.distance.iter().map(|&[field, _]| code(field)).collect();
         let size = 1usize << grid.grid.log2;
         let share = |place: usize| bilinear([place % size, place / size].map(|at| at as f32 / size as f32));
         let weight = |interval, frame| grid.weights(interval, frame, TIME_LINEAR)[3][2];
@@ -97,7 +93,7 @@ impl<'a> Work<'a> {
             let of_cell = |cell: usize| {
                 let index = interval * cells + cell;
                 let listed = sheets.lists[index].iter().enumerate();
-                let told = listed.filter(|&(sheet, &label)| tests_field(sheets, index, sheet) && !fields.strip[usize::from(label)]);
+                let told = listed.filter(|&(sheet, &label)| tests_field(sheets, index, sheet) && !fields.strip(label));
                 told.filter_map(|(sheet, _)| work.element(gbuffer, sheets, layers, [interval, cell], sheet)).collect::<Vec<_>>()
             };
             let found: Vec<_> = (0..cells).into_par_iter().map(of_cell).collect();

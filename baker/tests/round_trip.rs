@@ -146,7 +146,7 @@ fn more_layers_than_a_key_can_have_are_an_error_with_a_cure() {
     let layers = Layers::of(&grid, &sheets);
     let count = layers.label.len();
     let fit = fit::Fit { uv: vec![[0.5; 2]; count], weight: vec![1.0; count] };
-    let fields = fields::Fields { distance: vec![[0.0; 2]; count], strip: vec![false; image.labels.len()] };
+    let fields = fields::Fields { distance: vec![[0.0; 2]; count], thin: vec![fields::Thin::No; image.labels.len()] };
     let settings = CodingSettings { step_log2: 0, lambda: 0.0, independent_every: 1 };
     let content =
         Content { grid: &grid, image: &image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields, planes: &[], cameras: &[] };

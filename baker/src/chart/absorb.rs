@@ -4,6 +4,7 @@
 use super::NONE;
 use super::merge::Clusters;
 use super::observe::{Faces, Links};
+use crate::joins::root;
 use std::collections::BTreeMap;
 
 /// A cluster seen by fewer pixels than this in 9.8 million (128 frames of 320x240) joins another.
@@ -12,15 +13,6 @@ const SMALL: f64 = 600.0 / 9.8e6;
 const GRAZING: f64 = 0.2;
 /// The share of a cluster's hits that has to fit the plane it joins.
 const FITTING: f64 = 0.9;
-
-/// Follows joins to the cluster that is left.
-fn root(parent: &mut [u32], mut i: u32) -> u32 {
-    while parent[i as usize] != i {
-        parent[i as usize] = parent[parent[i as usize] as usize];
-        i = parent[i as usize];
-    }
-    i
-}
 
 /// Joins clusters, smallest first, and renumbers what is left; `samples` is the number of pixels of all frames.
 pub(crate) fn absorb(faces: &Faces, links: &Links, clusters: &mut Clusters, samples: usize) {
@@ -33,7 +25,7 @@ pub(crate) fn absorb(faces: &Faces, links: &Links, clusters: &mut Clusters, samp
     }
     let mut parent: Vec<u32> = (0..count as u32).collect();
     let limit = (SMALL * samples as f64).max(8.0) as u64;
-    let mut order: Vec<u32> = (0..count as u32).filter(|&c| parent[c as usize] == c && hits[c as usize] < limit).collect();
+    let mut order: Vec<u32> = (0..count as u32).filter(|&c| hits[c as usize] < limit).collect();
     order.sort_by_key(|&c| (hits[c as usize], c));
     for c in order {
         if hits[c as usize] >= limit {

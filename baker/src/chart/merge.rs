@@ -5,6 +5,7 @@ use super::directions;
 use super::flat::Flat;
 use super::observe::{Faces, Links};
 use super::refine;
+use crate::joins::root;
 use glam::DVec3;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -200,13 +201,4 @@ impl Joining {
         }
         brought
     }
-}
-
-/// Follows joins to the cluster that is left.
-fn root(parent: &mut [u32], mut i: u32) -> u32 {
-    while parent[i as usize] != i {
-        parent[i as usize] = parent[parent[i as usize] as usize];
-        i = parent[i as usize];
-    }
-    i
 }

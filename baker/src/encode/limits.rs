@@ -2,6 +2,7 @@
 //! Lists and layers come from the baker's stages; the bounds go into the path's header, and size the encoder's memory.
 
 use super::{CodingSettings, Content};
+use crate::fields::tests_field;
 use crate::sheets::Sheets;
 use cubist_core::format::{LabelRecord, Limits, STRIP, reach};
 use cubist_core::lists;
@@ -31,13 +32,11 @@ fn bound(what: &'static str, found: usize, cure: &'static str) -> Result<u16, Ex
 
 /// Fields that layers have to carry for the tests in `sheets`.
 fn fields_used(sheets: &Sheets, labels: &[LabelRecord]) -> u8 {
-    let per_sheet = |(list, &tests): (&Vec<u8>, &u16)| {
-        // The last sheet passes without a test: there are no bits for the ninth.
-        let tested =
-            list.iter().take(list.len().saturating_sub(1)).enumerate().filter(move |(at, _)| tests >> (2 * at) & 3 != lists::CHART);
+    let per_cell = |(index, list): (usize, &Vec<u8>)| {
+        let tested = list.iter().enumerate().filter(|&(sheet, _)| tests_field(sheets, index, sheet));
         tested.map(|(_, &label)| if labels[usize::from(label)].flags & STRIP != 0 { 2 } else { 1 }).max()
     };
-    sheets.lists.iter().zip(&sheets.tests).filter_map(per_sheet).max().unwrap_or(0)
+    sheets.lists.iter().enumerate().filter_map(per_cell).max().unwrap_or(0)
 }
 
 /// The bounds that the lists and layers keep.

@@ -6,11 +6,11 @@ mod picture;
 mod range;
 
 use crate::atlas::{SourceImage, Storage};
-use crate::fields::Fields;
+use crate::fields::{self, Fields, Thin};
 use crate::fit::Fit;
 use crate::sheets::{KeyGrid, Layers, Sheets};
 use cubist_core::coder::Probability;
-use cubist_core::fixed::{KEY_MAX, KEY_MIN, field_code};
+use cubist_core::fixed::{KEY_MAX, KEY_MIN};
 use cubist_core::format::{
     ATLAS, Atlas, Envelope, FIXED, INFO, KeyEntry, LABELS, LabelRecord, Limits, MAGIC, MASK, MASKED, PACKED, PATH, Path, RAW, STRIP,
     Section, VERSION,
@@ -76,8 +76,8 @@ pub fn bundle(content: &Content<'_>, settings: CodingSettings, header: Header<'_
     let &Content { grid, image, .. } = content;
     let key_bits = key_bits(image);
     let mut labels: Vec<LabelRecord> = image.labels.iter().map(|label| label_record(label, key_bits)).collect();
-    for (record, &strip) in labels.iter_mut().zip(&content.fields.strip) {
-        record.flags |= if strip { STRIP } else { 0 };
+    for (record, &thin) in labels.iter_mut().zip(&content.fields.thin) {
+        record.flags |= if thin == Thin::No { 0 } else { STRIP };
     }
     let bounds = limits::of(content, &labels, settings)?;
     let planes: Vec<[u8; PLANE_BYTES]> = content.planes.iter().map(Plane::to_bytes).collect();
@@ -253,7 +253,7 @@ impl Source for Wanted<'_> {
 
     fn field(&mut self, node: usize, label: u8, which: usize) -> i8 {
         let layer = self.content.layers.find(self.key * self.content.grid.grid.nodes() + node, label);
-        layer.map_or(0, |layer| field_code(libm::roundf(self.content.fields.distance[layer][which] * 256.0) as i32))
+        layer.map_or(0, |layer| fields::code(self.content.fields.distance[layer][which]))
     }
 
     fn residual(&mut self, node: usize, label: u8, predicted: [i32; 2], contexts: [&[Probability]; 2]) -> [i32; 2] {
