@@ -13,8 +13,18 @@ use std::cmp::Reverse;
 const NARROW: [u32; 2] = [2, 0];
 /// Texels between charts where they make the image no larger.
 const WIDE: [u32; 3] = [6, 4, 3];
-/// What a scale is multiplied by where bisection was a little too bold.
-const SMALLER: f64 = 0.99;
+/// A narrow gutter has to make the image this much denser than a wide one does to be preferred, where not all the density fits.
+const WORTH: f64 = 1.07;
+/// Scales tried beyond what bisection finds, a hundredth apart: what fits at one scale may not fit at a smaller one.
+const STEPS: i32 = 12;
+const STEP: f64 = 1.01;
+/// Ever longer steps back from what bisection finds, until what is seen but not drawn fits too.
+const BACK: i32 = 40;
+/// Orders for searching a scale; all are tried at the scale found.
+const QUICK: usize = 3;
+/// Shuffled orders, fewer where there are many charts to lay down in each.
+const SHUFFLED: usize = 12;
+const CHARTS: usize = 4096;
 
 /// Where everything lies.
 pub(crate) struct Layout {
@@ -52,8 +62,16 @@ impl Items {
             order.sort_by_cached_key(|&i| (Reverse((key(masks[i]), masks[i].area())), i));
             order
         };
+        let mut orders = Vec::from(keys.map(order));
+        for seed in 0..(CHARTS / masks.len()).min(SHUFFLED) as u32 {
+            // By area, but each multiplied by something between 0.5 and 1.5.
+            let chance = |i: usize| (i as u32 ^ seed << 16).wrapping_mul(2_654_435_761).wrapping_mul(2_246_822_519).rotate_left(15) >> 16;
+            let mut order: Vec<usize> = (0..masks.len()).collect();
+            order.sort_by_cached_key(|&i| (Reverse(u64::from(masks[i].area()) * u64::from((1 << 15) + chance(i))), i));
+            orders.push(order);
+        }
         let area = masks.iter().map(|m| u64::from(m.area())).sum();
-        Self { shapes, sizes: masks.iter().map(|m| [m.width, m.height]).collect(), area, orders: keys.map(order).into() }
+        Self { shapes, sizes: masks.iter().map(|m| [m.width, m.height]).collect(), area, orders }
     }
 
     /// Lays everything down in order `order`; the height, and the spots.
@@ -69,9 +87,9 @@ impl Items {
         Some((strip.height, spots))
     }
 
-    /// The spots in an image of this size, in the first order in which everything fits.
-    fn in_any_order(&self, size: [u32; 2], gutter: u32) -> Option<Vec<Spot>> {
-        (0..self.orders.len()).into_par_iter().find_map_first(|order| self.lay(order, size, gutter)).map(|(_, spots)| spots)
+    /// The spots in an image of this size, in the first of so many orders in which everything fits.
+    fn in_any_order(&self, orders: usize, size: [u32; 2], gutter: u32) -> Option<Vec<Spot>> {
+        (0..orders.min(self.orders.len())).into_par_iter().find_map_first(|order| self.lay(order, size, gutter)).map(|(_, spots)| spots)
     }
 
     /// The smallest image that one of the orders makes: its size, and the spots.
@@ -121,35 +139,61 @@ fn fit(fits: impl Fn(f64) -> bool) -> Option<f64> {
 
 /// Packs everything into sides of at most `max_side`; `None` if not even charts of one texel fit.
 pub(super) fn pack(footprints: &Footprints<'_>, backdrop: [u32; 2], max_side: u32) -> Option<Layout> {
-    let charting = footprints.charting;
-    // The width is a power of two: a side in between limits the height only.
-    let (side, most) = (1 << max_side.ilog2(), max_side / 4 * 4);
-    let items = |scale: f64, seen: bool| {
-        let sizes = sizes(charting, scale, side);
-        let mut masks = footprints.drawn(&sizes, scale);
+    NARROW.into_iter().find_map(|gutter| Packing { footprints, backdrop, max_side }.with(gutter))
+}
+
+/// What there is to pack, and the room for it.
+struct Packing<'a> {
+    footprints: &'a Footprints<'a>,
+    backdrop: [u32; 2],
+    max_side: u32,
+}
+
+impl Packing<'_> {
+    /// The largest width and height. The width is a power of two: a side in between limits the height only.
+    fn room(&self) -> [u32; 2] {
+        [1 << self.max_side.ilog2(), self.max_side / 4 * 4]
+    }
+
+    /// The masks at a scale. What is seen but not drawn is little, and asking all samples for it takes long.
+    fn items(&self, scale: f64, seen: bool) -> Items {
+        let [side, _] = self.room();
+        let mut masks = self.footprints.drawn(&sizes(self.footprints.charting, scale, side), scale);
         if seen {
-            footprints.add_seen(&mut masks);
+            self.footprints.add_seen(&mut masks);
         }
-        Items::new(scaled(backdrop, scale, side), &masks)
-    };
-    let fitting = |gutter: u32| fit(|scale| items(scale, false).in_any_order([side, most], gutter).is_some());
-    let (mut gutter, mut scale) = NARROW.into_iter().find_map(|gutter| fitting(gutter).map(|scale| (gutter, scale)))?;
-    // What is seen but not drawn is little, and left out until here because asking all samples takes long.
-    let (mut items_at, mut found) = (items(scale, true), None);
-    for _ in 0..64 {
-        found = items_at.smallest(side, most, gutter);
-        if found.is_some() {
-            break;
+        Items::new(scaled(self.backdrop, scale, side), &masks)
+    }
+
+    /// Everything at least `gutter` texels apart.
+    fn with(&self, mut gutter: u32) -> Option<Layout> {
+        let [side, most] = self.room();
+        let fits = |scale: f64, gutter: u32| self.items(scale, false).in_any_order(QUICK, [side, most], gutter).is_some();
+        let mut scale = fit(|scale| fits(scale, gutter))?;
+        if scale < 1.0 {
+            if let Some(wide) = WIDE.into_iter().find(|&wide| gutter > 0 && fits(scale / WORTH, wide)) {
+                (gutter, scale) = (wide, scale / WORTH);
+            }
+            let larger = (1..=STEPS).rev().map(|step| (scale * STEP.powi(step)).min(1.0));
+            scale = larger.into_iter().find(|&scale| fits(scale, gutter)).unwrap_or(scale);
         }
-        scale *= SMALLER;
-        items_at = items(scale, true);
+        for back in 1..=BACK {
+            let items = self.items(scale, true);
+            if let Some((size, spots)) = items.smallest(side, most, gutter) {
+                return Some(self.settled(&items, size, spots, scale, gutter));
+            }
+            scale /= STEP.powi(back);
+        }
+        None
     }
-    let (size, mut spots) = found?;
-    // More room between charts keeps what is thought to lie beyond one from falling on another: where it is free, it is taken.
-    if let Some((wide, found)) = WIDE.into_iter().find_map(|wide| items_at.in_any_order(size, wide).map(|found| (wide, found))) {
-        (gutter, spots) = (wide, found);
+
+    /// Takes more room between charts where it is free: it keeps what is thought to lie beyond one from falling on another.
+    fn settled(&self, items: &Items, size: [u32; 2], spots: Vec<Spot>, scale: f64, gutter: u32) -> Layout {
+        let mut wider = WIDE.into_iter().filter(|&wide| wide > gutter);
+        let found = wider.find_map(|wide| Some((wide, items.in_any_order(usize::MAX, size, wide)?)));
+        let (gutter, spots) = found.unwrap_or((gutter, spots));
+        finish(self.footprints.charting, &items.sizes, &spots, size, scale, gutter)
     }
-    Some(finish(charting, &items_at.sizes, &spots, size, scale, gutter))
 }
 
 fn finish(charting: &Charting, sizes: &[[u32; 2]], spots: &[Spot], [width, height]: [u32; 2], scale: f64, gutter: u32) -> Layout {
