@@ -8,6 +8,7 @@ use super::strip::{Shape, Spot, Strip};
 use crate::chart::Charting;
 use rayon::prelude::*;
 use std::cmp::Reverse;
+use std::ops::Range;
 
 /// Texels between charts: as many as bilinear lookup needs to meet no neighbour, and none where nothing else fits.
 const NARROW: [u32; 2] = [2, 0];
@@ -23,8 +24,8 @@ const BACK: i32 = 40;
 /// Orders for searching a scale; all are tried at the scale found.
 const QUICK: usize = 3;
 /// Shuffled orders, fewer where there are many charts to lay down in each.
-const SHUFFLED: usize = 12;
-const CHARTS: usize = 4096;
+const SHUFFLED: usize = 40;
+const CHARTS: usize = 8192;
 
 /// Where everything lies.
 pub(crate) struct Layout {
@@ -94,10 +95,19 @@ impl Items {
 
     /// The smallest image that one of the orders makes: its size, and the spots.
     fn smallest(&self, side: u32, most: u32, gutter: u32) -> Option<([u32; 2], Vec<Spot>)> {
+        let best = self.smaller(0..QUICK, side, gutter, |_| most)?;
+        // The others need not be laid down to the end where they come to no less.
+        let [width, height] = best.0;
+        let less = |wide: u32| ((width * height - 1) / wide / 4 * 4).min(most);
+        self.smaller(QUICK..self.orders.len(), side, gutter, less).or(Some(best))
+    }
+
+    /// The smallest image that some of the orders make, of at most `most` rows for its width.
+    fn smaller(&self, orders: Range<usize>, side: u32, gutter: u32, most: impl Fn(u32) -> u32 + Sync) -> Option<([u32; 2], Vec<Spot>)> {
         let widths = (6..=side.ilog2()).rev().map(|log2| 1 << log2);
-        let tries: Vec<(u32, usize)> = widths.flat_map(|width| (0..self.orders.len()).map(move |order| (width, order))).collect();
+        let tries: Vec<(u32, usize)> = widths.flat_map(|width| orders.clone().map(move |order| (width, order))).collect();
         let of = |(i, &(width, order)): (usize, &(u32, usize))| {
-            let (height, spots) = self.lay(order, [width, most], gutter)?;
+            let (height, spots) = self.lay(order, [width, most(width)], gutter)?;
             let height = height.next_multiple_of(4);
             Some((width * height, i, [width, height], spots))
         };

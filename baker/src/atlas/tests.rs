@@ -227,19 +227,14 @@ fn texels_lie_in_their_own_charts_footprint() {
 
 #[test]
 fn charts_are_packed_tightly() {
-    // A chart's own rectangle, and one for each of many triangles: half of every one of those is another's.
+    // Triangles apart: half of each one's rectangle is free for others.
     let triangle = |i: u32| {
         let (x, z) = (f64::from(i % 8) * 0.35 - 1.4, f64::from(i / 8) * 0.35 - 1.4);
         let tilt = 0.06 * f64::from(i * 7 % 11);
-        [DVec3::new(x, 0.0, z), DVec3::new(x, tilt, z + 0.3), DVec3::new(x + 0.3, 0.1 * f64::from(i % 3), z)]
+        let corners = [DVec3::new(x, 0.0, z), DVec3::new(x, tilt, z + 0.3), DVec3::new(x + 0.3, 0.1 * f64::from(i % 3), z)];
+        quad([corners[0], corners[1], corners[2], corners[0]])[0]
     };
-    let mut triangles = Vec::new();
-    for i in 0..64 {
-        let corners = triangle(i);
-        let mut t = quad([corners[0], corners[1], corners[2], corners[0]])[0].clone();
-        t.position = corners;
-        triangles.push(t);
-    }
+    let triangles = (0..64).map(triangle).collect();
     let scene = scene(triangles, Vec::new(), Material::default());
     let atlas = made(&scene, &hits(&scene));
     println!("{:?}: {} x {}", atlas.figures, atlas.image.width, atlas.image.height);

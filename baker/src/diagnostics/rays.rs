@@ -6,38 +6,35 @@ use cubist_baker::bake::Flat;
 use cubist_baker::tears::{DOWN, RIGHT};
 use tiny_skia::{Color, FillRule, Paint, PathBuilder, Pixmap, PremultipliedColorU8, Stroke, Transform};
 
-/// What the frame does not see is shown at this share of its brightness, in 256ths.
-const DIM: u16 = 72;
-/// Texels that the frame's pixels fall on.
-const DOT: [u8; 3] = [255, 255, 255];
-/// Of a dot's colour this share is seen, in 256ths.
-const DOT_SHARE: u16 = 96;
-/// Half the side of a node's mark and the width of a line, pixels.
-const NODE: f32 = 2.2;
-const LINE: f32 = 1.4;
+/// The source image is shown at this share of its brightness, in 256ths: rays stand out.
+const DIM: u16 = 120;
+/// The colour of rays, and the share of it that is seen where they lie too close for dots of their own, in 256ths.
+const DOT: [u8; 3] = [0, 208, 255];
+const DOT_SHARE: u16 = 176;
+/// The radius of a node's mark and the width of a line, pixels.
+const NODE: f32 = 3.0;
+const LINE: f32 = 1.6;
 
-/// The source image, dimmed but where `frame` sees it; a dot for each of its rays, and those at the corners of cells of `cell` pixels as nodes,
-/// with a line between neighbours that see the same surface all along.
+/// The source image, dimmed; a dot for each ray of `frame`, and the rays at the corners of cells of `cell` pixels as nodes, with a line between
+/// neighbours that see the same surface all along.
 pub fn draw(flat: &Flat, frame: u32, cell: u32) -> Picture {
     let (image, gbuffer) = (&flat.atlas.image, &flat.atlas.gbuffer);
     let (width, height, cell) = (gbuffer.width as usize, gbuffer.height as usize, cell.max(1) as usize);
     let first = frame as usize * width * height;
-    let pixels = first..first + width * height;
-    let mut seen = vec![false; image.texels.len()];
-    for uv in &gbuffer.uv[pixels.clone()] {
-        seen[uv[1] as usize * image.width as usize + uv[0] as usize] = true;
-    }
-    let texel = |(i, &seen): (usize, &bool)| {
-        let colour = image.palette.get(usize::from(image.texels[i])).copied().unwrap_or_default();
-        if seen { colour } else { colour.map(|v| (u16::from(v) * DIM / 256) as u8) }
+    let dimmed = |&texel: &u8| {
+        let colour = image.palette.get(usize::from(texel)).copied().unwrap_or_default();
+        colour.map(|v| (u16::from(v) * DIM / 256) as u8)
     };
-    let mut picture = Picture::enlarged(&seen.iter().enumerate().map(texel).collect::<Vec<_>>(), image.width);
-    let scale = SIDE as f32 / image.width as f32;
-    let place = |pixel: usize| gbuffer.uv[pixel].map(|v| v * scale);
-    for pixel in pixels {
+    let mut picture = Picture::enlarged(&image.texels.iter().map(dimmed).collect::<Vec<_>>(), image.width);
+    let scale = SIDE / image.width;
+    let place = |pixel: usize| gbuffer.uv[pixel].map(|v| v * scale as f32);
+    let dot = (scale / 3).max(1) as usize;
+    for pixel in first..first + width * height {
         let [x, y] = place(pixel).map(|v| v as usize);
-        if let Some(under) = picture.pixels.get_mut(y * SIDE as usize + x) {
-            *under = std::array::from_fn(|k| ((u16::from(under[k]) * (256 - DOT_SHARE) + u16::from(DOT[k]) * DOT_SHARE) / 256) as u8);
+        for row in picture.pixels.chunks_mut(SIDE as usize).skip(y).take(dot) {
+            for under in row.iter_mut().skip(x).take(dot) {
+                *under = std::array::from_fn(|k| ((u16::from(under[k]) * (256 - DOT_SHARE) + u16::from(DOT[k]) * DOT_SHARE) / 256) as u8);
+            }
         }
     }
     let (mut lines, mut nodes) = (PathBuilder::new(), PathBuilder::new());
