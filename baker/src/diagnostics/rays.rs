@@ -28,7 +28,7 @@ pub fn draw(flat: &Flat, frame: u32, cell: u32) -> Picture {
     let mut picture = Picture::enlarged(&image.texels.iter().map(dimmed).collect::<Vec<_>>(), image.width);
     let scale = SIDE / image.width;
     let place = |pixel: usize| gbuffer.uv[pixel].map(|v| v * scale as f32);
-    let dot = (scale / 3).max(1) as usize;
+    let dot = (scale / 2).max(1) as usize;
     for pixel in first..first + width * height {
         let [x, y] = place(pixel).map(|v| v as usize);
         for row in picture.pixels.chunks_mut(SIDE as usize).skip(y).take(dot) {
