@@ -66,7 +66,10 @@ impl Items {
         let mut orders = Vec::from(keys.map(order));
         for seed in 0..(CHARTS / masks.len()).min(SHUFFLED) as u32 {
             // By area, but each multiplied by something between 0.5 and 1.5.
-            let chance = |i: usize| (i as u32 ^ seed << 16).wrapping_mul(2_654_435_761).wrapping_mul(2_246_822_519).rotate_left(15) >> 16;
+            let chance = |i: usize| {
+                let mixed = (i as u32 ^ seed << 16).wrapping_mul(2_654_435_761);
+                (mixed ^ mixed >> 15).wrapping_mul(2_246_822_519) >> 16
+            };
             let mut order: Vec<usize> = (0..masks.len()).collect();
             order.sort_by_cached_key(|&i| (Reverse(u64::from(masks[i].area()) * u64::from((1 << 15) + chance(i))), i));
             orders.push(order);
