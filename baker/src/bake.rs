@@ -2,6 +2,7 @@
 //! The stages are the crate's modules; this runs them in order, times them, and reports progress.
 
 use crate::atlas::{self, Atlas, AtlasError, SourceImage};
+use crate::causes::{self, Causes};
 use crate::encode::{self, CodingSettings, Content};
 use crate::folds::{self, Folded};
 use crate::gbuffer::{Hits, Lens};
@@ -139,6 +140,8 @@ pub struct Flat {
     pub atlas: Atlas,
     /// Where the G-buffer's charts hide parts of themselves (see [`tears`]).
     pub tears: Vec<u8>,
+    /// Where its charts meet on one surface (see [`causes`]).
+    pub seams: Vec<u8>,
     /// The flat ones among the labels.
     pub planes: Vec<Option<FlatChart>>,
     /// Rays cast.
@@ -157,6 +160,8 @@ pub struct Encoded {
     pub grid: KeyGrid,
     /// Pixels whose sheet was too small to keep.
     pub dropped_pixels: u64,
+    /// Why cells are torn.
+    pub torn_by_cause: Causes,
     /// Seconds for sheets, fit and coding.
     pub seconds: f64,
 }
@@ -176,8 +181,9 @@ pub fn flatten(scene: &Scene, settings: &atlas::Settings, progress: Progress<'_>
     let atlas = atlas::build(scene, &hits, settings, &|done, total| progress("flattening surfaces", part(done, total)))?;
     progress("looking for tears", 0.0);
     let tears = tears::find(scene, &tracer, &hits, &atlas.gbuffer);
+    let seams = causes::seams(scene, &hits, &atlas.gbuffer);
     let planes = planes::find(scene, &hits, &atlas.gbuffer, atlas.image.labels.len());
-    Ok(Flat { tears, planes, rays: hits.samples.len() as u64, atlas, ray_seconds, atlas_seconds: start.elapsed().as_secs_f64() })
+    Ok(Flat { tears, seams, planes, rays: hits.samples.len() as u64, atlas, ray_seconds, atlas_seconds: start.elapsed().as_secs_f64() })
 }
 
 /// Fits and codes the keys, and puts the bundle together.
@@ -202,8 +208,10 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let least = if volume < 512 { settings.least_pixels.min(volume / 64).max(1) } else { settings.least_pixels };
     progress("finding sheets", 0.0);
     let Folded { gbuffer, labels, stands_for } = folds::unfold(gbuffer, &flat.tears, &grid, &image.labels, least.saturating_mul(2));
+    let exact = &flat.atlas.gbuffer;
     let (gbuffer, image) = (&gbuffer, &SourceImage { labels, ..image.clone() });
     let mut sheets = sheets::find(gbuffer, &grid, least);
+    let torn_by_cause = causes::count(exact, &flat.tears, &flat.seams, &grid, &sheets);
     let layers = Layers::of(&grid, &sheets);
     progress("fitting keys", 0.2);
     let charts: Vec<Option<FlatChart>> = stands_for.iter().map(|&label| flat.planes[usize::from(label)]).collect();
@@ -226,5 +234,5 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
         Content { grid: &grid, image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields, planes: &planes, cameras: &cameras };
     let bundle = encode::bundle(&content, settings.coding, header)?;
     progress("coding keys", 1.0);
-    Ok(Encoded { bundle, grid, dropped_pixels: sheets.dropped, seconds: start.elapsed().as_secs_f64() })
+    Ok(Encoded { bundle, grid, dropped_pixels: sheets.dropped, torn_by_cause, seconds: start.elapsed().as_secs_f64() })
 }

@@ -3,6 +3,7 @@
 
 use crate::atlas::Storage;
 use crate::bake::{Encoded, Flat, Settings};
+use crate::causes::Causes;
 use crate::inspect::Inspection;
 use crate::scene::Scene;
 use crate::verify::{Quality, TruthQuality, Work};
@@ -101,6 +102,8 @@ pub struct Source {
     pub density: f64,
     /// What densities were multiplied by to make everything fit; at most 1.
     pub scale: f64,
+    /// Texels between charts.
+    pub gutter: u32,
 }
 
 /// The report; its keys keep their names and meaning.
@@ -136,6 +139,8 @@ pub struct Report {
     pub quality_vs_truth: Option<TruthQuality>,
     /// Work per frame.
     pub work: Work,
+    /// Cells of the key-ray grid that show several surfaces, by why.
+    pub torn_by_cause: Causes,
     /// What the player does beyond looking up texels.
     pub effects: Vec<String>,
     /// What the user should know.
@@ -188,6 +193,7 @@ impl Report {
                 fill: figures.fill,
                 density: settings.atlas.density,
                 scale: figures.scale,
+                gutter: figures.gutter,
             },
             bytes: Bytes {
                 bundle: inspection.bytes,
@@ -203,6 +209,7 @@ impl Report {
             quality,
             quality_vs_truth: truth,
             work,
+            torn_by_cause: encoded.torn_by_cause,
             effects: vec!["palette".to_owned()],
             warnings: scene.warnings.iter().cloned().chain(warnings(origin)).collect(),
         }

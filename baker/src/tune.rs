@@ -12,7 +12,7 @@ use crate::samples::Samples;
 use crate::scene::Scene;
 use crate::trace::Tracer;
 use crate::verify;
-use crate::{planes, tears};
+use crate::{causes, planes, tears};
 use std::time::Instant;
 
 /// Cells tried, pixels.
@@ -117,6 +117,7 @@ impl Search<'_> {
         let atlas = atlas::build(self.scene, &self.hits, &source, &|_, _| {})?;
         let flat = Flat {
             tears: tears::find(self.scene, &self.tracer, &self.hits, &atlas.gbuffer),
+            seams: causes::seams(self.scene, &self.hits, &atlas.gbuffer),
             planes: planes::find(self.scene, &self.hits, &atlas.gbuffer, atlas.image.labels.len()),
             atlas,
             rays: self.hits.samples.len() as u64,

@@ -1,8 +1,10 @@
 //! Colouring: what each texel shows, and what lies between the charts.
 //! Places come from the packing, colours from [`Shader`]; the coloured image goes to the palette.
 
+use super::Seen;
+use super::footprint::{each_sample, fine, members};
 use super::pack::Layout;
-use super::{Place, Seen};
+use super::place::Place;
 use crate::chart::{Charting, NONE, Projection};
 use crate::gbuffer::{Hits, Sample};
 use crate::scene::Scene;
@@ -12,6 +14,8 @@ use rayon::prelude::*;
 
 /// Rounds by which colours are continued beyond their charts, a texel each.
 const BEYOND: usize = 8;
+/// How far beyond an edge, as a barycentric weight, a colour sample still is the face's.
+const EDGE: f64 = 1e-9;
 
 /// The image before its colours are reduced.
 pub(super) struct Filled {
@@ -37,11 +41,7 @@ struct Reference {
 
 /// Colours all charts and the background, and continues them into the gutters.
 pub(super) fn fill(scene: &Scene, shader: &Shader<'_>, hits: &Hits, charting: &Charting, layout: &Layout, seen: &Seen) -> Filled {
-    let mut members: Vec<Vec<u32>> = vec![Vec::new(); charting.charts.len()];
-    for (f, &c) in charting.chart_of.iter().enumerate() {
-        members[c as usize].push(f as u32);
-    }
-    let patches: Vec<Vec<Option<Vec3>>> = members
+    let patches: Vec<Vec<Option<Vec3>>> = members(charting)
         .par_iter()
         .enumerate()
         .map(|(c, faces)| Patch { scene, shader, hits, charting, layout, seen, chart: c, place: layout.places[c] }.colour(faces))
@@ -51,7 +51,8 @@ pub(super) fn fill(scene: &Scene, shader: &Shader<'_>, hits: &Hits, charting: &C
         let row = (rect[2] - rect[0]) as usize;
         for (y, texels) in (rect[1]..rect[3]).zip(patch.chunks(row.max(1))) {
             let start = (y * layout.width + rect[0]) as usize;
-            image[start..start + row].copy_from_slice(texels);
+            // Others' texels may lie in the rectangle too.
+            image[start..start + row].iter_mut().zip(texels).filter(|(_, new)| new.is_some()).for_each(|(old, new)| *old = *new);
         }
     };
     for (place, patch) in layout.places.iter().zip(&patches) {
@@ -110,23 +111,23 @@ impl Patch<'_> {
     /// World units a texel covers; 0 for a texture copied texel by texel.
     fn texel_size(&self) -> f64 {
         match self.charting.charts[self.chart].projection {
-            Projection::Plane(_) => 1.0 / (self.place.step[0] * self.place.step[1]).sqrt(),
+            Projection::Plane(_) => self.place.texel(),
             Projection::Texture => 0.0,
         }
     }
 
-    /// The first sample that falls into a texel of the chart.
+    /// The first sample that falls into a texel, if it is one of the chart.
     fn first(&self, x: u32, y: u32) -> Option<Reference> {
         let texel = ((self.place.rect[1] + y) * self.layout.width + self.place.rect[0] + x) as usize;
         let sample = *self.hits.samples.get(self.seen.first[texel] as usize)?;
         let face = *self.charting.faces.of.get(sample.surface as usize)?;
-        (face != NONE).then(|| Reference { sample, depth: self.charting.flat(face as usize, f64::from(sample.b), f64::from(sample.c))[2] })
+        let own = face != NONE && self.charting.chart_of[face as usize] as usize == self.chart;
+        own.then(|| Reference { sample, depth: self.charting.flat(face as usize, f64::from(sample.b), f64::from(sample.c))[2] })
     }
 
-    /// Colour samples a texel has in each direction: one where texels are copied.
+    /// Colour samples a texel has in each direction.
     fn fine(&self) -> u32 {
-        let copied = matches!(self.charting.charts[self.chart].projection, Projection::Texture) && self.layout.scale >= 1.0;
-        if copied { 1 } else { 2 }
+        fine(&self.charting.charts[self.chart].projection, self.layout.scale)
     }
 
     /// The chart's texels, row-major; `None` where it shows nothing.
@@ -163,42 +164,30 @@ impl Patch<'_> {
 
     /// Lays one face over the samples it is in front of.
     fn draw(&self, face: u32, width: u32, references: &[Option<Reference>], spots: &mut [Spot]) {
-        let Place { rect, origin, step } = self.place;
+        let Place { rect, .. } = self.place;
         let fine = self.fine();
-        let corners = self.charting.corners[face as usize];
-        let [p, q, r] = corners.map(|c| [0, 1].map(|k| (origin[k] + c[k] * step[k] - f64::from(rect[k])) * f64::from(fine)));
-        let det = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
-        if det.abs() < 1e-12 {
-            return;
-        }
         let surface = self.charting.faces.list[face as usize].surface;
         let cosine = match self.charting.charts[self.chart].projection {
             Projection::Plane(axes) => self.charting.faces.list[face as usize].normal.dot(axes[2]).abs().max(0.2),
             Projection::Texture => 1.0,
         };
         let reach = self.texel_size() * (3.0 + 3.0 * (1.0 / (cosine * cosine) - 1.0).sqrt());
-        let range = |k: usize| {
-            let (lo, hi) = (p[k].min(q[k]).min(r[k]), p[k].max(q[k]).max(r[k]));
-            let most = f64::from((rect[k + 2] - rect[k]) * fine);
-            ((lo - 0.5).ceil().clamp(0.0, most) as u32)..((hi + 0.5).floor().clamp(0.0, most) as u32)
-        };
-        for j in range(1) {
-            for i in range(0) {
-                let at = [f64::from(i) + 0.5 - p[0], f64::from(j) + 0.5 - p[1]];
-                let b = (at[0] * (r[1] - p[1]) - at[1] * (r[0] - p[0])) / det;
-                let c = ((q[0] - p[0]) * at[1] - (q[1] - p[1]) * at[0]) / det;
-                if b.min(c).min(1.0 - b - c) < -1e-9 || is_hole(self.scene, surface / 2, [b, c]) {
-                    continue;
-                }
-                let depth = self.charting.flat(face as usize, b, c)[2];
-                // What the camera sees decides; where it sees nothing, what lies in front. Of equals the first, as in
-                // ray casting.
-                let seen = references[(j / fine * width + i / fine) as usize].as_ref();
-                let spot = &mut spots[(j * width * fine + i) as usize];
-                if seen.is_none_or(|r| (depth - r.depth).abs() <= reach) && depth > spot.depth + 1e-9 * depth.abs() {
-                    *spot = Spot { face, bary: [b, c], depth };
-                }
+        let corners = self.charting.corners[face as usize].map(|c| {
+            let at = self.place.at(c);
+            [0, 1].map(|k| (at[k] - f64::from(rect[k])) * f64::from(fine))
+        });
+        each_sample(corners, [0, 1].map(|k| (rect[k + 2] - rect[k]) * fine), EDGE, |i, j, [b, c]| {
+            if is_hole(self.scene, surface / 2, [b, c]) {
+                return;
             }
-        }
+            let depth = self.charting.flat(face as usize, b, c)[2];
+            // What the camera sees decides; where it sees nothing, what lies in front. Of equals the first, as in
+            // ray casting.
+            let seen = references[(j / fine * width + i / fine) as usize].as_ref();
+            let spot = &mut spots[(j * width * fine + i) as usize];
+            if seen.is_none_or(|r| (depth - r.depth).abs() <= reach) && depth > spot.depth + 1e-9 * depth.abs() {
+                *spot = Spot { face, bary: [b, c], depth };
+            }
+        });
     }
 }

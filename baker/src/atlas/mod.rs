@@ -2,8 +2,12 @@
 //! Charts come from [`crate::chart`]; the image and the G-buffer go to the sheets, the fit and the encoder.
 
 mod fill;
+mod footprint;
+mod mask;
 mod pack;
 mod palette;
+mod place;
+mod strip;
 
 use crate::chart::{self, Charting};
 use crate::gbuffer::{BACKGROUND, GBuffer, Hits};
@@ -19,8 +23,6 @@ use thiserror::Error;
 pub const MAX_LABELS: usize = 256;
 /// Labels beyond this are avoided by sharing them.
 const WANTED_LABELS: usize = 255;
-/// How far inside its label's rectangle a coordinate stays, texels.
-const INSIDE: f32 = 1.0 / 128.0;
 
 /// Why there is no source image.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
@@ -137,28 +139,6 @@ pub struct Figures {
     pub gutter: u32,
 }
 
-/// Where a chart lies and how it gets there.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Place {
-    /// x0, y0, x1, y1, the ends exclusive.
-    pub rect: [u32; 4],
-    /// Texel coordinates of the flattened origin.
-    pub origin: [f64; 2],
-    /// Texels a unit of flattened length.
-    pub step: [f64; 2],
-}
-
-impl Place {
-    /// Texel coordinates of flattened coordinates, within the rectangle.
-    #[inline]
-    pub fn uv(&self, flat: [f64; 3]) -> [f32; 2] {
-        [0, 1].map(|k| {
-            let at = (self.origin[k] + flat[k] * self.step[k]) as f32;
-            at.clamp(self.rect[k] as f32 + INSIDE, self.rect[k + 2] as f32 - INSIDE)
-        })
-    }
-}
-
 /// Everything about the source image that later stages need.
 pub struct Atlas {
     /// The picture.
@@ -183,7 +163,7 @@ pub fn build(scene: &Scene, hits: &Hits, settings: &Settings, progress: &(dyn Fn
         return Err(AtlasError::Labels { found: labels + 1 });
     }
     let backdrop = backdrop(scene, hits);
-    let layout = pack::pack(&charting, backdrop, settings.max_side)
+    let layout = pack::pack(&footprint::Footprints::new(scene, hits, &charting), backdrop, settings.max_side)
         .ok_or(AtlasError::Room { charts: charting.charts.len(), side: settings.max_side })?;
     progress(2, 4);
     let fixed = fixed(scene, &layout.backdrop);

@@ -1,14 +1,31 @@
-//! Packing: a rectangle for every chart, in the smallest image that holds them.
-//! Charts come measured from the charting; places go to the G-buffer and the colouring.
+//! Packing: a place for every chart, in the smallest image that holds them.
+//! Charts come measured from the charting, their masks from `footprint`; places go to the G-buffer and the colouring.
 
-use super::Place;
+use super::footprint::Footprints;
+use super::mask::Mask;
+use super::place::Place;
+use super::strip::{Shape, Spot, Strip};
 use crate::chart::Charting;
-use guillotiere::{AllocatorOptions, AtlasAllocator, size2};
+use rayon::prelude::*;
+use std::cmp::Reverse;
+use std::ops::Range;
 
-/// Texels between charts where there is room, where there is not, and where nothing else fits.
-const GUTTERS: [u32; 3] = [6, 2, 0];
-/// How much denser the narrow gutter has to make the image to be preferred.
-const WORTH: f64 = 1.15;
+/// Texels between charts: as many as bilinear lookup needs to meet no neighbour, and none where nothing else fits.
+const NARROW: [u32; 2] = [2, 0];
+/// Texels between charts where they make the image no larger.
+const WIDE: [u32; 3] = [6, 4, 3];
+/// A narrow gutter has to make the image this much denser than a wide one does to be preferred, where not all the density fits.
+const WORTH: f64 = 1.07;
+/// Scales tried beyond what bisection finds, a hundredth apart: what fits at one scale may not fit at a smaller one.
+const STEPS: i32 = 12;
+const STEP: f64 = 1.01;
+/// Ever longer steps back from what bisection finds, until what is seen but not drawn fits too.
+const BACK: i32 = 40;
+/// Orders for searching a scale; all are tried at the scale found.
+const QUICK: usize = 3;
+/// Shuffled orders, fewer where there are many charts to lay down in each.
+const SHUFFLED: usize = 40;
+const CHARTS: usize = 8192;
 
 /// Where everything lies.
 pub(crate) struct Layout {
@@ -24,40 +41,100 @@ pub(crate) struct Layout {
     pub places: Vec<Place>,
 }
 
-/// Sizes in texels at a scale: the background's, then the charts'.
-fn sizes(charting: &Charting, backdrop: [u32; 2], scale: f64, most: u32) -> Vec<[u32; 2]> {
-    let texels = |length: f64| (length * scale - 1e-6).ceil().clamp(1.0, f64::from(most)) as u32;
-    let small = backdrop.iter().all(|&v| v <= 4);
-    let first = if small { backdrop } else { backdrop.map(|v| texels(f64::from(v))) };
-    let charts = charting.charts.iter().map(|c| [0, 1].map(|k| texels((c.hi[k] - c.lo[k]) * c.density)));
-    std::iter::once(first).chain(charts).collect()
+/// Masks in all their turns: the background's, then the charts'.
+struct Items {
+    shapes: Vec<Vec<Shape>>,
+    /// Their sizes, straight.
+    sizes: Vec<[u32; 2]>,
+    area: u64,
+    /// Orders to lay them down in.
+    orders: Vec<Vec<usize>>,
 }
 
-/// Tries to place rectangles; returns their top left corners.
-fn place(sizes: &[[u32; 2]], width: u32, height: u32, gutter: u32) -> Option<Vec<[u32; 2]>> {
-    let area: u64 = sizes.iter().map(|[w, h]| u64::from(w + gutter) * u64::from(h + gutter)).sum();
-    if area > u64::from(width) * u64::from(height) {
-        return None;
-    }
-    let keys: [fn(&[u32; 2]) -> u32; 3] = [|s| s[0].max(s[1]), |s| s[1], |s| s[0] * s[1]];
-    keys.iter().find_map(|key| {
-        let mut order: Vec<usize> = (0..sizes.len()).collect();
-        order.sort_by_key(|&i| (std::cmp::Reverse((key(&sizes[i]), sizes[i][0])), i));
-        let options = AllocatorOptions { small_size_threshold: 16, large_size_threshold: 128, ..Default::default() };
-        let mut allocator = AtlasAllocator::with_options(size2(width as i32, height as i32), &options);
-        let mut corners = vec![[0; 2]; sizes.len()];
-        for i in order {
-            let [w, h] = sizes[i].map(|v| (v + gutter) as i32);
-            let at = allocator.allocate(size2(w, h))?.rectangle.min;
-            corners[i] = [at.x as u32 + gutter / 2, at.y as u32 + gutter / 2];
+impl Items {
+    fn new(backdrop: [u32; 2], charts: &[Mask]) -> Self {
+        let first = Mask::full(backdrop[0], backdrop[1]);
+        let masks: Vec<&Mask> = std::iter::once(&first).chain(charts).collect();
+        // The background is fixed to the screen, which does not turn.
+        let shapes = masks.par_iter().enumerate().map(|(i, mask)| Shape::turns(mask, i > 0)).collect();
+        let keys: [fn(&Mask) -> u32; 3] = [|m| m.area(), |m| m.width.max(m.height), |m| m.width + m.height];
+        let order = |key: fn(&Mask) -> u32| {
+            let mut order: Vec<usize> = (0..masks.len()).collect();
+            order.sort_by_cached_key(|&i| (Reverse((key(masks[i]), masks[i].area())), i));
+            order
+        };
+        let mut orders = Vec::from(keys.map(order));
+        for seed in 0..(CHARTS / masks.len()).min(SHUFFLED) as u32 {
+            // By area, but each multiplied by something between 0.5 and 1.5.
+            let chance = |i: usize| {
+                let mixed = (i as u32 ^ seed << 16).wrapping_mul(2_654_435_761);
+                (mixed ^ mixed >> 15).wrapping_mul(2_246_822_519) >> 16
+            };
+            let mut order: Vec<usize> = (0..masks.len()).collect();
+            order.sort_by_cached_key(|&i| (Reverse(u64::from(masks[i].area()) * u64::from((1 << 15) + chance(i))), i));
+            orders.push(order);
         }
-        Some(corners)
-    })
+        let area = masks.iter().map(|m| u64::from(m.area())).sum();
+        Self { shapes, sizes: masks.iter().map(|m| [m.width, m.height]).collect(), area, orders }
+    }
+
+    /// Lays everything down in order `order`; the height, and the spots.
+    fn lay(&self, order: usize, [width, height]: [u32; 2], gutter: u32) -> Option<(u32, Vec<Spot>)> {
+        if self.area > u64::from(width) * u64::from(height) {
+            return None;
+        }
+        let mut strip = Strip::new(width, height, gutter);
+        let mut spots = vec![Spot { x: 0, y: 0, turns: 0 }; self.shapes.len()];
+        for &i in &self.orders[order] {
+            spots[i] = strip.place(&self.shapes[i])?;
+        }
+        Some((strip.height, spots))
+    }
+
+    /// The spots in an image of this size, in the first of so many orders in which everything fits.
+    fn in_any_order(&self, orders: usize, size: [u32; 2], gutter: u32) -> Option<Vec<Spot>> {
+        (0..orders.min(self.orders.len())).into_par_iter().find_map_first(|order| self.lay(order, size, gutter)).map(|(_, spots)| spots)
+    }
+
+    /// The smallest image that one of the orders makes: its size, and the spots.
+    fn smallest(&self, side: u32, most: u32, gutter: u32) -> Option<([u32; 2], Vec<Spot>)> {
+        let best = self.smaller(0..QUICK, side, gutter, |_| most)?;
+        // The others need not be laid down to the end where they come to no less.
+        let [width, height] = best.0;
+        let less = |wide: u32| ((width * height - 1) / wide / 4 * 4).min(most);
+        self.smaller(QUICK..self.orders.len(), side, gutter, less).or(Some(best))
+    }
+
+    /// The smallest image that some of the orders make, of at most `most` rows for its width.
+    fn smaller(&self, orders: Range<usize>, side: u32, gutter: u32, most: impl Fn(u32) -> u32 + Sync) -> Option<([u32; 2], Vec<Spot>)> {
+        let widths = (6..=side.ilog2()).rev().map(|log2| 1 << log2);
+        let tries: Vec<(u32, usize)> = widths.flat_map(|width| orders.clone().map(move |order| (width, order))).collect();
+        let of = |(i, &(width, order)): (usize, &(u32, usize))| {
+            let (height, spots) = self.lay(order, [width, most(width)], gutter)?;
+            let height = height.next_multiple_of(4);
+            Some((width * height, i, [width, height], spots))
+        };
+        let best = tries.par_iter().enumerate().filter_map(of).min_by_key(|&(texels, i, ..)| (texels, i));
+        best.map(|(_, _, size, spots)| (size, spots))
+    }
+}
+
+/// Sizes of the charts in texels at a scale.
+fn sizes(charting: &Charting, scale: f64, most: u32) -> Vec<[u32; 2]> {
+    charting.charts.iter().map(|c| [0, 1].map(|k| texels((c.hi[k] - c.lo[k]) * c.density, scale, most))).collect()
+}
+
+fn texels(length: f64, scale: f64, most: u32) -> u32 {
+    (length * scale - 1e-6).ceil().clamp(1.0, f64::from(most)) as u32
+}
+
+/// The background's size at a scale: little of one colour stays as it is.
+fn scaled(backdrop: [u32; 2], scale: f64, most: u32) -> [u32; 2] {
+    if backdrop.iter().all(|&v| v <= 4) { backdrop } else { backdrop.map(|v| texels(f64::from(v), scale, most)) }
 }
 
 /// The largest scale, at most 1, at which everything fits.
-fn fit(charting: &Charting, backdrop: [u32; 2], side: u32, gutter: u32) -> Option<f64> {
-    let fits = |scale: f64| place(&sizes(charting, backdrop, scale, side - gutter), side, side, gutter).is_some();
+fn fit(fits: impl Fn(f64) -> bool) -> Option<f64> {
     if fits(1.0) {
         return Some(1.0);
     }
@@ -74,49 +151,72 @@ fn fit(charting: &Charting, backdrop: [u32; 2], side: u32, gutter: u32) -> Optio
 }
 
 /// Packs everything into sides of at most `max_side`; `None` if not even charts of one texel fit.
-pub(super) fn pack(charting: &Charting, backdrop: [u32; 2], max_side: u32) -> Option<Layout> {
-    // The width is a power of two: a side in between limits the height only.
-    let (side, max_side) = (1 << max_side.ilog2(), max_side / 4 * 4);
-    let (wide, narrow) = (fit(charting, backdrop, side, GUTTERS[0]), || fit(charting, backdrop, side, GUTTERS[1]));
-    let (scale, gutter) = match wide {
-        Some(scale) if scale >= 1.0 => (scale, GUTTERS[0]),
-        Some(scale) => narrow().filter(|n| *n > scale * WORTH).map_or((scale, GUTTERS[0]), |n| (n, GUTTERS[1])),
-        None => match narrow() {
-            Some(scale) => (scale, GUTTERS[1]),
-            None => (fit(charting, backdrop, side, GUTTERS[2])?, GUTTERS[2]),
-        },
+pub(super) fn pack(footprints: &Footprints<'_>, backdrop: [u32; 2], max_side: u32) -> Option<Layout> {
+    NARROW.into_iter().find_map(|gutter| Packing { footprints, backdrop, max_side }.with(gutter))
+}
+
+/// What there is to pack, and the room for it.
+struct Packing<'a> {
+    footprints: &'a Footprints<'a>,
+    backdrop: [u32; 2],
+    max_side: u32,
+}
+
+impl Packing<'_> {
+    /// The largest width and height. The width is a power of two: a side in between limits the height only.
+    fn room(&self) -> [u32; 2] {
+        [1 << self.max_side.ilog2(), self.max_side / 4 * 4]
+    }
+
+    /// The masks at a scale. What is seen but not drawn is little, and asking all samples for it takes long.
+    fn items(&self, scale: f64, seen: bool) -> Items {
+        let [side, _] = self.room();
+        let mut masks = self.footprints.drawn(&sizes(self.footprints.charting, scale, side), scale);
+        if seen {
+            self.footprints.add_seen(&mut masks);
+        }
+        Items::new(scaled(self.backdrop, scale, side), &masks)
+    }
+
+    /// Everything at least `gutter` texels apart.
+    fn with(&self, mut gutter: u32) -> Option<Layout> {
+        let [side, most] = self.room();
+        let fits = |scale: f64, gutter: u32| self.items(scale, false).in_any_order(QUICK, [side, most], gutter).is_some();
+        let mut scale = fit(|scale| fits(scale, gutter))?;
+        if scale < 1.0 {
+            if let Some(wide) = WIDE.into_iter().find(|&wide| gutter > 0 && fits(scale / WORTH, wide)) {
+                (gutter, scale) = (wide, scale / WORTH);
+            }
+            let larger = (1..=STEPS).rev().map(|step| (scale * STEP.powi(step)).min(1.0));
+            scale = larger.into_iter().find(|&scale| fits(scale, gutter)).unwrap_or(scale);
+        }
+        for back in 1..=BACK {
+            let items = self.items(scale, true);
+            if let Some((size, spots)) = items.smallest(side, most, gutter) {
+                return Some(self.settled(&items, size, spots, scale, gutter));
+            }
+            scale /= STEP.powi(back);
+        }
+        None
+    }
+
+    /// Takes more room between charts where it is free: it keeps what is thought to lie beyond one from falling on another.
+    fn settled(&self, items: &Items, size: [u32; 2], spots: Vec<Spot>, scale: f64, gutter: u32) -> Layout {
+        let mut wider = WIDE.into_iter().filter(|&wide| wide > gutter);
+        let found = wider.find_map(|wide| Some((wide, items.in_any_order(usize::MAX, size, wide)?)));
+        let (gutter, spots) = found.unwrap_or((gutter, spots));
+        finish(self.footprints.charting, &items.sizes, &spots, size, scale, gutter)
+    }
+}
+
+fn finish(charting: &Charting, sizes: &[[u32; 2]], spots: &[Spot], [width, height]: [u32; 2], scale: f64, gutter: u32) -> Layout {
+    let rect = |(&[w, h], &Spot { x, y, turns }): (&[u32; 2], &Spot)| {
+        let [w, h] = if turns % 2 == 1 { [h, w] } else { [w, h] };
+        [x, y, x + w, y + h]
     };
-    let mut width = 64;
-    while width <= side {
-        let sizes = sizes(charting, backdrop, scale, side - gutter);
-        if let Some(corners) = place(&sizes, width, max_side, gutter) {
-            let (height, corners) = lower(&sizes, width, max_side, gutter, corners);
-            return Some(finish(charting, &sizes, &corners, [width, height], scale, gutter));
-        }
-        width *= 2;
-    }
-    None
-}
-
-/// The least height, a multiple of 4, that bisection finds.
-fn lower(sizes: &[[u32; 2]], width: u32, most: u32, gutter: u32, mut corners: Vec<[u32; 2]>) -> (u32, Vec<[u32; 2]>) {
-    let (mut low, mut high) = (0, most.div_ceil(4));
-    while high - low > 1 {
-        let middle = (low + high) / 2;
-        match place(sizes, width, middle * 4, gutter) {
-            Some(found) => (high, corners) = (middle, found),
-            None => low = middle,
-        }
-    }
-    (high * 4, corners)
-}
-
-fn finish(charting: &Charting, sizes: &[[u32; 2]], corners: &[[u32; 2]], [width, height]: [u32; 2], scale: f64, gutter: u32) -> Layout {
-    let rects: Vec<[u32; 4]> = sizes.iter().zip(corners).map(|([w, h], [x, y])| [*x, *y, x + w, y + h]).collect();
-    let places = charting.charts.iter().zip(&rects[1..]).map(|(c, &rect)| {
-        // Each direction is stretched to whole texels: the outline of a rectangle is then the chart's own.
-        let step = [0, 1].map(|k| f64::from(rect[k + 2] - rect[k]) / (c.hi[k] - c.lo[k]).max(1e-12 * c.hi[k].abs()).max(f64::MIN_POSITIVE));
-        Place { rect, origin: [0, 1].map(|k| f64::from(rect[k]) - c.lo[k] * step[k]), step }
-    });
+    let rects: Vec<[u32; 4]> = sizes.iter().zip(spots).map(rect).collect();
+    // Each direction is stretched to whole texels: the outline of a rectangle is then the chart's own.
+    let places =
+        charting.charts.iter().zip(rects.iter().zip(spots).skip(1)).map(|(c, (&rect, spot))| Place::new(rect, c.lo, c.hi, spot.turns));
     Layout { width, height, scale, gutter, backdrop: rects[0], places: places.collect() }
 }

@@ -182,6 +182,67 @@ fn planes_are_charts_of_their_own_and_a_smooth_hill_is_one() {
 }
 
 #[test]
+fn texels_lie_in_their_own_charts_footprint() {
+    for scene in [cube(), hill(), crossing()] {
+        let hits = hits(&scene);
+        let charting = chart::build(&scene, &hits, 1.0, 512);
+        let footprints = footprint::Footprints::new(&scene, &hits, &charting);
+        for side in [64, 512] {
+            let layout = pack::pack(&footprints, [4, 4], side).expect("a layout");
+            let size = |place: &place::Place| {
+                let [x0, y0, x1, y1] = place.rect;
+                if place.swap { [y1 - y0, x1 - x0] } else { [x1 - x0, y1 - y0] }
+            };
+            let mut masks = footprints.drawn(&layout.places.iter().map(size).collect::<Vec<_>>(), layout.scale);
+            footprints.add_seen(&mut masks);
+            // The chart of every texel, from the masks, turned as their places are.
+            let mut owner = vec![None; (layout.width * layout.height) as usize];
+            for (chart, (mask, place)) in masks.iter().zip(&layout.places).enumerate() {
+                let turns = match (place.swap, place.step.map(|s| s < 0.0)) {
+                    (false, [back, _]) => 2 * u8::from(back),
+                    (true, [back, _]) => {
+                        if back {
+                            1
+                        } else {
+                            3
+                        }
+                    }
+                };
+                for run in (0..turns).fold(mask.clone(), |mask, _| mask.turned()).runs() {
+                    for x in run.start..run.start + run.length {
+                        let at = (place.rect[1] + run.row) * layout.width + place.rect[0] + x;
+                        assert_eq!(owner[at as usize].replace(chart), None, "two charts share texel {at}");
+                    }
+                }
+            }
+            for s in hits.samples.iter().filter(|s| s.surface != BACKGROUND) {
+                let face = charting.faces.of[s.surface as usize] as usize;
+                let chart = charting.chart_of[face] as usize;
+                let [u, v] = layout.places[chart].uv(charting.flat(face, f64::from(s.b), f64::from(s.c)));
+                assert_eq!(owner[v as usize * layout.width as usize + u as usize], Some(chart), "{u}, {v} is not in the chart's mask");
+            }
+        }
+    }
+}
+
+#[test]
+fn charts_are_packed_tightly() {
+    // Triangles apart: half of each one's rectangle is free for others.
+    let triangle = |i: u32| {
+        let (x, z) = (f64::from(i % 8) * 0.35 - 1.4, f64::from(i / 8) * 0.35 - 1.4);
+        let tilt = 0.06 * f64::from(i * 7 % 11);
+        let corners = [DVec3::new(x, 0.0, z), DVec3::new(x, tilt, z + 0.3), DVec3::new(x + 0.3, 0.1 * f64::from(i % 3), z)];
+        quad([corners[0], corners[1], corners[2], corners[0]])[0]
+    };
+    let triangles = (0..64).map(triangle).collect();
+    let scene = scene(triangles, Vec::new(), Material::default());
+    let atlas = made(&scene, &hits(&scene));
+    println!("{:?}: {} x {}", atlas.figures, atlas.image.width, atlas.image.height);
+    assert!(atlas.figures.charts > 10 && atlas.figures.gutter >= 2 && atlas.figures.scale == 1.0);
+    assert!(atlas.figures.fill > 0.4, "{:?}", atlas.figures);
+}
+
+#[test]
 fn threads_do_not_matter() {
     let scene = hill();
     let on = |threads: usize| {

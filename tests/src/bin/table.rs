@@ -7,7 +7,7 @@ use cubist_baker::bake::Settings;
 use cubist_baker::scene::{Overrides, builtin, load, load_builtin};
 use cubist_tests::codecs::ffmpeg::Ffmpeg;
 use cubist_tests::tables::document::Document;
-use cubist_tests::tables::{self, Table, codecs, coverage, edges};
+use cubist_tests::tables::{self, Table, atlas, codecs, coverage, edges};
 use std::path::PathBuf;
 
 /// Prints the tables of the README and the docs.
@@ -50,6 +50,11 @@ enum Name {
     /// Bytes beside those of other codecs at equal PSNR and SSIM (needs ffmpeg).
     Codecs {
         /// Built-in scenes or scene files; left out: four built-in ones.
+        scenes: Vec<String>,
+    },
+    /// What scenes are cut into, how tightly that is packed, why cells are torn, and MJPEG and GIF beside it (needs ffmpeg for MJPEG).
+    Atlas {
+        /// Built-in scenes or scene files; left out: five built-in ones.
         scenes: Vec<String>,
     },
     /// What antialiased outlines are worth against the antialiased scene, and what they cost.
@@ -104,6 +109,13 @@ fn table(name: &Name, overrides: &Overrides) -> Result<Table> {
             }
             codecs::table(rows, ffmpeg.as_ref())
         }
+        Name::Atlas { scenes } => {
+            let ffmpeg = Ffmpeg::find();
+            for name in or_default(scenes, &atlas::SCENES) {
+                rows.push(atlas::measure(&tables::scene(&name, overrides)?, ffmpeg.as_ref())?);
+            }
+            atlas::table(rows)
+        }
         Name::Edges { scenes } => {
             for name in or_default(scenes, &edges::SCENES) {
                 rows.push(edges::measure(&tables::scene(&name, overrides)?)?);
@@ -121,6 +133,7 @@ impl Name {
             Self::Scenes { .. } => "scenes",
             Self::Coverage { .. } => "coverage",
             Self::Codecs { .. } => "codecs",
+            Self::Atlas { .. } => "atlas",
             Self::Edges { .. } => "edges",
         }
     }

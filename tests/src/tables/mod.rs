@@ -1,6 +1,7 @@
 //! The project's tables: what scenes cost and how well they play, beside other ways of playing and other codecs.
 //! Scenes come from the baker, figures from the rest of this crate; tables go to the command `table` and into the documents.
 
+pub mod atlas;
 pub mod builtin;
 pub mod codecs;
 pub mod coverage;

@@ -1,0 +1,136 @@
+//! Footprints: the texels that each chart shows something in, at a given scale. No two charts may share one.
+//! Charts and samples come from the charting and the G-buffer; the masks go to the packing.
+
+use super::mask::Mask;
+use super::place::Place;
+use crate::chart::{Charting, Projection};
+use crate::gbuffer::{BACKGROUND, Hits};
+use crate::scene::Scene;
+use crate::shade::is_hole;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// How far beyond an edge, as a barycentric weight, a texel's colour sample still is the face's: more than rounding makes of a turned chart.
+const EDGE: f64 = 1e-7;
+/// How close to a texel's edge, texels, a sample may come to lie on the other side when its chart lies elsewhere.
+const CLOSE: f64 = 1.0 / 1024.0;
+
+/// What footprints are made of.
+pub(super) struct Footprints<'a> {
+    pub scene: &'a Scene,
+    pub hits: &'a Hits,
+    pub charting: &'a Charting,
+    members: Vec<Vec<u32>>,
+}
+
+/// The faces of each chart.
+pub(super) fn members(charting: &Charting) -> Vec<Vec<u32>> {
+    let mut members: Vec<Vec<u32>> = vec![Vec::new(); charting.charts.len()];
+    for (face, &chart) in charting.chart_of.iter().enumerate() {
+        members[chart as usize].push(face as u32);
+    }
+    members
+}
+
+/// Colour samples a texel of a chart has in each direction: one where texels are copied.
+pub(super) fn fine(projection: &Projection, scale: f64) -> u32 {
+    if matches!(projection, Projection::Texture) && scale >= 1.0 { 1 } else { 2 }
+}
+
+/// Calls `f` with the column, the row and the barycentric weights of every sample, one at the centre of each square of side 1 from (0, 0) to
+/// `size`, that lies in a triangle or at most `edge` of it beyond.
+pub(super) fn each_sample(corners: [[f64; 2]; 3], size: [u32; 2], edge: f64, mut f: impl FnMut(u32, u32, [f64; 2])) {
+    let [p, q, r] = corners;
+    let det = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
+    if det.abs() < 1e-12 {
+        return;
+    }
+    let range = |k: usize| {
+        let (lo, hi) = (p[k].min(q[k]).min(r[k]), p[k].max(q[k]).max(r[k]));
+        let (most, room) = (f64::from(size[k]), edge * (hi - lo));
+        ((lo - 0.5 - room).ceil().clamp(0.0, most) as u32)..((hi + 0.5 + room).floor().clamp(0.0, most) as u32)
+    };
+    for j in range(1) {
+        for i in range(0) {
+            let at = [f64::from(i) + 0.5 - p[0], f64::from(j) + 0.5 - p[1]];
+            let b = (at[0] * (r[1] - p[1]) - at[1] * (r[0] - p[0])) / det;
+            let c = ((q[0] - p[0]) * at[1] - (q[1] - p[1]) * at[0]) / det;
+            if b.min(c).min(1.0 - b - c) >= -edge {
+                f(i, j, [b, c]);
+            }
+        }
+    }
+}
+
+impl<'a> Footprints<'a> {
+    pub fn new(scene: &'a Scene, hits: &'a Hits, charting: &'a Charting) -> Self {
+        Self { scene, hits, charting, members: members(charting) }
+    }
+
+    /// The place of a chart on its own.
+    fn place(&self, chart: usize, [width, height]: [u32; 2]) -> Place {
+        let c = &self.charting.charts[chart];
+        Place::new([0, 0, width, height], c.lo, c.hi, 0)
+    }
+
+    /// The texels whose colour samples the charts' faces cover, for charts of `sizes`.
+    pub fn drawn(&self, sizes: &[[u32; 2]], scale: f64) -> Vec<Mask> {
+        let of = |(chart, faces): (usize, &Vec<u32>)| {
+            let (size, place) = (sizes[chart], self.place(chart, sizes[chart]));
+            let fine = fine(&self.charting.charts[chart].projection, scale);
+            let mut mask = Mask::new(size[0], size[1]);
+            for &face in faces {
+                let surface = self.charting.faces.list[face as usize].surface;
+                let corners = self.charting.corners[face as usize].map(|c| place.at(c).map(|v| v * f64::from(fine)));
+                each_sample(corners, size.map(|v| v * fine), EDGE, |x, y, bary| {
+                    let (x, y) = (x / fine, y / fine);
+                    if !mask.has(x, y) && !is_hole(self.scene, surface / 2, bary) {
+                        mask.set(x, y);
+                    }
+                });
+            }
+            mask
+        };
+        self.members.par_iter().enumerate().map(of).collect()
+    }
+
+    /// Adds the texels that pixels see: faces may be too thin for a colour sample.
+    pub fn add_seen(&self, masks: &mut [Mask]) {
+        let places: Vec<Place> = masks.iter().enumerate().map(|(chart, m)| self.place(chart, [m.width, m.height])).collect();
+        let mut start = vec![0];
+        for m in masks.iter() {
+            start.push(start[start.len() - 1] + m.width as usize * m.height as usize);
+        }
+        let seen: Vec<AtomicU64> = (0..start[masks.len()].div_ceil(64)).map(|_| AtomicU64::new(0)).collect();
+        self.hits.samples.par_chunks(1 << 16).for_each(|samples| {
+            for s in samples.iter().filter(|s| s.surface != BACKGROUND) {
+                let face = self.charting.faces.of[s.surface as usize] as usize;
+                let chart = self.charting.chart_of[face] as usize;
+                let at = places[chart].at(self.charting.flat(face, f64::from(s.b), f64::from(s.c)));
+                let [w, h] = [masks[chart].width, masks[chart].height];
+                let texels = |k: usize, size: u32| {
+                    let texel = |v: f64| v.clamp(0.0, f64::from(size - 1)) as usize;
+                    texel(at[k] - CLOSE)..=texel(at[k] + CLOSE)
+                };
+                for y in texels(1, h) {
+                    for x in texels(0, w) {
+                        let i = start[chart] + y * w as usize + x;
+                        let (word, bit) = (&seen[i / 64], 1 << (i % 64));
+                        // Most texels are seen again and again: looking is cheaper than writing.
+                        if word.load(Ordering::Relaxed) & bit == 0 {
+                            word.fetch_or(bit, Ordering::Relaxed);
+                        }
+                    }
+                }
+            }
+        });
+        masks.par_iter_mut().zip(&start).for_each(|(mask, &start)| {
+            for i in 0..mask.width * mask.height {
+                let at = start + i as usize;
+                if seen[at / 64].load(Ordering::Relaxed) >> (at % 64) & 1 == 1 {
+                    mask.set(i % mask.width, i / mask.width);
+                }
+            }
+        });
+    }
+}

@@ -1,0 +1,274 @@
+//! A strip of texels, as wide as the source image and as long as it takes: masks lie where there is room for them first, row by row.
+//! `pack` hands in masks in an order of its own and takes the places; holes inside and between masks are filled by what comes later.
+
+use super::mask::{Mask, Run, next};
+
+/// The most words a row has: 1024 texels.
+const WORDS: usize = 16;
+
+type Row = [u64; WORDS];
+
+/// A mask in one of its four turns.
+pub(super) struct Shape {
+    pub turns: u8,
+    width: u32,
+    height: u32,
+    /// The longest first: they are the first to be in the way.
+    runs: Vec<Run>,
+}
+
+impl Shape {
+    /// The turns of `mask` that differ, or only the first.
+    pub fn turns(mask: &Mask, all: bool) -> Vec<Self> {
+        let mut masks = vec![mask.clone()];
+        for turn in 1..if all { 4 } else { 1 } {
+            masks.push(masks[turn - 1].turned());
+        }
+        let mut out: Vec<Self> = Vec::new();
+        for (turns, mask) in (0u8..).zip(&masks) {
+            if !masks[..usize::from(turns)].contains(mask) {
+                let mut runs = mask.runs();
+                runs.sort_by_key(|run| (std::cmp::Reverse(run.length), run.row, run.start));
+                out.push(Self { turns, width: mask.width, height: mask.height, runs });
+            }
+        }
+        out
+    }
+}
+
+/// Where a mask lies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Spot {
+    pub x: u32,
+    pub y: u32,
+    /// Quarter turns.
+    pub turns: u8,
+}
+
+/// The strip.
+pub(super) struct Strip {
+    width: u32,
+    /// Rows there may be.
+    most: u32,
+    /// Texels between masks.
+    gutter: u32,
+    /// Rows up to the last that holds something.
+    pub height: u32,
+    /// Levels a row has.
+    levels: usize,
+    /// Level k of a row says for each texel whether one of the 2^k from it on is taken, gutters included: two of them tell of any run.
+    taken: Vec<Row>,
+    /// The longest run of free texels in each row.
+    free: Vec<u32>,
+}
+
+impl Strip {
+    /// An empty strip, `width` texels wide, a power of two up to 1024.
+    pub fn new(width: u32, most: u32, gutter: u32) -> Self {
+        let levels = width.ilog2() as usize + 1;
+        Self { width, most, gutter, height: 0, levels, taken: vec![[0; WORDS]; levels * most as usize], free: vec![width; most as usize] }
+    }
+
+    /// Lays down one of the turns of a mask, where the strip grows least, then where it is highest, then leftmost.
+    pub fn place(&mut self, shapes: &[Shape]) -> Option<Spot> {
+        let mut best: Option<(u32, Spot)> = None;
+        let mut chosen = None;
+        for shape in shapes {
+            if let Some((end, spot)) = self.find(shape, best.map(|(end, spot)| (end, spot.y, spot.x))) {
+                (best, chosen) = (Some((end, spot)), Some(shape));
+            }
+        }
+        let ((_, spot), shape) = best.zip(chosen)?;
+        self.take(shape, spot);
+        Some(spot)
+    }
+
+    /// The best spot of a shape, if it is better than one that ends the strip at, and has its y and x at, `bound`.
+    fn find(&self, shape: &Shape, bound: Option<(u32, u32, u32)>) -> Option<(u32, Spot)> {
+        let last = self.most.checked_sub(shape.height)?;
+        let right = self.width.checked_sub(shape.width)?;
+        // What has no texels lies anywhere.
+        let longest = shape.runs.first().copied().unwrap_or(Run { row: 0, start: 0, length: 0 });
+        let words = self.width as usize / 64;
+        // A set bit is a column that the shape's left edge cannot lie in.
+        let mut outside = [u64::MAX; WORDS];
+        (0..=right).for_each(|x| outside[x as usize / 64] &= !(1 << (x % 64)));
+        for y in 0..=last {
+            let end = (y + shape.height).max(self.height);
+            if bound.is_some_and(|(e, by, _)| (end, y) > (e, by)) {
+                return None;
+            }
+            if self.free[(y + longest.row) as usize] < longest.length {
+                continue;
+            }
+            let mut blocked = outside;
+            for run in &shape.runs {
+                let level = run.length.ilog2();
+                let row = &self.taken[(y + run.row) as usize * self.levels + level as usize];
+                block(&mut blocked[..words], &row[..words], run.start);
+                if run.length > 1 << level {
+                    block(&mut blocked[..words], &row[..words], run.start + run.length - (1 << level));
+                }
+                if blocked[..words].iter().all(|&word| word == u64::MAX) {
+                    break;
+                }
+            }
+            if let Some(x) = next(&blocked[..words], 0, true) {
+                let better = bound.is_none_or(|bound| (end, y, x) < bound);
+                return better.then_some((end, Spot { x, y, turns: shape.turns }));
+            }
+        }
+        None
+    }
+
+    /// Marks a shape and its gutter as taken.
+    fn take(&mut self, shape: &Shape, spot: Spot) {
+        let gutter = self.gutter;
+        let words = self.width as usize / 64;
+        for run in &shape.runs {
+            let (left, right) = ((spot.x + run.start).saturating_sub(gutter), (spot.x + run.start + run.length + gutter).min(self.width));
+            let row = spot.y + run.row;
+            for y in row.saturating_sub(gutter)..(row + gutter + 1).min(self.most) {
+                set(&mut self.taken[y as usize * self.levels], left, right);
+            }
+        }
+        for y in spot.y.saturating_sub(gutter)..(spot.y + shape.height + gutter).min(self.most) {
+            let row = &mut self.taken[y as usize * self.levels..][..self.levels];
+            for level in 1..self.levels {
+                row[level] = row[level - 1];
+                let [below, here] = &mut row[level - 1..=level] else { continue };
+                block(&mut here[..words], &below[..words], 1 << (level - 1));
+            }
+            self.free[y as usize] = longest_free(&row[0][..words], self.width);
+        }
+        self.height = self.height.max(spot.y + shape.height);
+    }
+}
+
+/// Adds to `out` what `row` has `by` texels further right.
+#[inline]
+fn block(out: &mut [u64], row: &[u64], by: u32) {
+    let (whole, part) = (by as usize / 64, by % 64);
+    let Some(row) = row.get(whole..) else { return };
+    for (i, (out, &word)) in out.iter_mut().zip(row).enumerate() {
+        // Shifted twice, since 64 is too far at once.
+        let above = row.get(i + 1).map_or(0, |&word| word << 1 << (63 - part));
+        *out |= word >> part | above;
+    }
+}
+
+/// Sets the bits `left`..`right`.
+fn set(row: &mut Row, left: u32, right: u32) {
+    for (i, word) in row.iter_mut().enumerate().take(right.div_ceil(64) as usize).skip(left as usize / 64) {
+        let at = i as u32 * 64;
+        let (from, to) = (left.max(at) - at, right.min(at + 64) - at);
+        *word |= (u64::MAX >> (64 - (to - from))) << from;
+    }
+}
+
+/// The longest run of clear bits among the first `width`.
+fn longest_free(row: &[u64], width: u32) -> u32 {
+    let (mut at, mut longest) = (0, 0);
+    while let Some(start) = next(row, at, true) {
+        at = next(row, start, false).unwrap_or(width);
+        longest = longest.max(at - start);
+    }
+    longest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn mask(rows: &[&str]) -> Mask {
+        let mut mask = Mask::new(rows[0].len() as u32, rows.len() as u32);
+        for (y, row) in (0..).zip(rows) {
+            row.chars().zip(0..).filter(|(c, _)| *c == '#').for_each(|(_, x)| mask.set(x, y));
+        }
+        mask
+    }
+
+    /// Lays masks down in turn; the strip's height and, of each texel, the mask that lies there.
+    fn laid(masks: &[Mask], width: u32, gutter: u32) -> (u32, Vec<Option<usize>>) {
+        let mut strip = Strip::new(width, 1024, gutter);
+        let mut owner = vec![None; width as usize * 1024];
+        for (i, m) in masks.iter().enumerate() {
+            let spot = strip.place(&Shape::turns(m, true)).expect("room");
+            let turned = (0..spot.turns).fold(m.clone(), |m, _| m.turned());
+            for run in turned.runs() {
+                for x in run.start..run.start + run.length {
+                    let texel = &mut owner[((spot.y + run.row) * width + spot.x + x) as usize];
+                    assert_eq!(texel.replace(i), None, "mask {i} lies on another");
+                }
+            }
+        }
+        (strip.height, owner)
+    }
+
+    #[test]
+    fn holes_are_filled() {
+        // A ring has room for what fits into it, gutter and all.
+        let mut ring = Mask::new(64, 64);
+        let inside = |x: u32| (8..56).contains(&x);
+        (0..64).for_each(|y| (0..64).filter(|&x| !inside(x) || !inside(y)).for_each(|x| ring.set(x, y)));
+        let (height, owner) = laid(&[ring.clone(), Mask::full(44, 44)], 64, 2);
+        assert_eq!((height, owner[10 * 64 + 10], owner[9 * 64 + 10]), (64, Some(1), None));
+        assert_eq!(laid(&[ring, Mask::full(45, 44)], 64, 2).0, 64 + 2 + 44);
+    }
+
+    #[test]
+    fn polyominoes_lie_close() {
+        // Forty sets of six pentominoes, eight texels a square, without gutters.
+        let shapes =
+            [&["###", "#  ", "#  "][..], &["####", "#   "], &["## ", " ##", " # "], &["###", " # ", " # "], &["## ", "###"], &["#####"]];
+        let big: Vec<Mask> = shapes
+            .iter()
+            .map(|rows| {
+                let m = mask(rows);
+                let mut out = Mask::new(m.width * 8, m.height * 8);
+                (0..out.height).for_each(|y| (0..out.width).filter(|x| m.has(x / 8, y / 8)).for_each(|x| out.set(x, y)));
+                out
+            })
+            .collect();
+        let masks: Vec<Mask> = (0..240).map(|i| big[i % 6].clone()).collect();
+        let area: u32 = masks.iter().map(Mask::area).sum();
+        let (height, _) = laid(&masks, 256, 0);
+        let fill = f64::from(area) / f64::from(256 * height);
+        assert!(fill > 0.88, "{fill} of {height} rows is filled, expected more than 0.88");
+    }
+
+    proptest! {
+        #[test]
+        fn gutters_are_kept(seeds in prop::collection::vec((1u32..40, 1u32..40, any::<u32>()), 1..30), gutter in 0u32..5, wide in any::<bool>()) {
+            let width = if wide { 128 } else { 64 };
+            let masks: Vec<Mask> = seeds
+                .iter()
+                .map(|&(w, h, seed)| {
+                    let mut m = Mask::new(w, h);
+                    for i in 0..w * h {
+                        if (i.wrapping_mul(2_654_435_761) ^ seed).wrapping_mul(2_246_822_519) >> 29 > 2 {
+                            m.set(i % w, i / w);
+                        }
+                    }
+                    m.set(w / 2, h / 2);
+                    m
+                })
+                .collect();
+            let (height, owner) = laid(&masks, width, gutter);
+            let placed = owner.iter().flatten().count();
+            prop_assert_eq!(placed as u32, masks.iter().map(Mask::area).sum::<u32>());
+            for y in 0..height {
+                for x in 0..width {
+                    let Some(own) = owner[(y * width + x) as usize] else { continue };
+                    for j in y..=(y + gutter).min(height - 1) {
+                        for i in x.saturating_sub(gutter)..=(x + gutter).min(width - 1) {
+                            let other = owner[(j * width + i) as usize];
+                            prop_assert!(other.is_none_or(|other| other == own), "{own} at {x}, {y} is too close to {other:?} at {i}, {j}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! Pictures that show what a bake did: the source image, what of it is covered, seen and how finely; frames exact, played, and as rays in it.
+//! A finished job comes in; PNG files go out.
+
+mod maps;
+mod rays;
+mod texels;
+
+use anyhow::Result;
+use cubist_baker::atlas::SourceImage;
+use cubist_baker::files::write_png;
+use cubist_baker::job::Baked;
+use cubist_baker::truth::spread;
+use cubist_baker::verify;
+use std::path::Path;
+
+/// Frames shown exact and played.
+const FRAMES: u32 = 3;
+/// How much stronger than it is a difference is shown.
+const GAIN: u8 = 4;
+/// The colour of the charts' borders.
+const BORDER: [u8; 3] = [255, 0, 255];
+/// Width of enlarged pictures of the source image, pixels: a whole number for a texel.
+const SIDE: u32 = 1024;
+
+/// A picture [`SIDE`] pixels wide.
+struct Picture {
+    pixels: Vec<[u8; 3]>,
+}
+
+impl Picture {
+    /// Texels of a source image of `width` texels a row, each as a square.
+    fn enlarged(texels: &[[u8; 3]], width: u32) -> Self {
+        let scale = (SIDE / width) as usize;
+        let row = |row: &[[u8; 3]]| -> Vec<[u8; 3]> { row.iter().flat_map(|&texel| std::iter::repeat_n(texel, scale)).collect() };
+        Self { pixels: texels.chunks(width as usize).flat_map(|texels| row(texels).repeat(scale)).collect() }
+    }
+
+    fn height(&self) -> u32 {
+        self.pixels.len() as u32 / SIDE
+    }
+
+    /// Fills a rectangle: left, top, right, bottom.
+    fn fill(&mut self, [left, top, right, bottom]: [u32; 4], colour: [u8; 3]) {
+        for y in top..bottom {
+            self.pixels[(y * SIDE + left) as usize..(y * SIDE + right) as usize].fill(colour);
+        }
+    }
+
+    fn write(&self, path: &Path) -> Result<()> {
+        write_png(path, SIDE, self.pixels.as_flattened())
+    }
+}
+
+/// Writes into `folder`: source-image.png, mask.png, never-seen.png and density.png; for three frames and the worst one frame-NNNN-exact.png,
+/// frame-NNNN-played.png, frame-NNNN-compare.png (exact, played, their difference four times as strong) and frame-NNNN-rays.png.
+pub fn write(folder: &Path, baked: &Baked) -> Result<()> {
+    let (flat, report) = (&baked.flat, &baked.report);
+    let image = &flat.atlas.image;
+    write_png(&folder.join("source-image.png"), image.width, &bordered(image))?;
+    let mask: Vec<u8> = image.covered.iter().flat_map(|&covered| if covered { [255; 3] } else { [0; 3] }).collect();
+    write_png(&folder.join("mask.png"), image.width, &mask)?;
+    let seen = texels::seen(flat);
+    maps::never_seen(image, &texels::never_seen(flat, &seen)).write(&folder.join("never-seen.png"))?;
+    let asked = report.source_image.density * report.source_image.scale;
+    maps::density(image, &seen, asked).write(&folder.join("density.png"))?;
+    let gbuffer = &flat.atlas.gbuffer;
+    let mut result = Ok(());
+    let mut frames = spread(gbuffer.frames, FRAMES);
+    frames.push(report.quality.worst_frame);
+    frames.sort_unstable();
+    frames.dedup();
+    verify::play(&baked.bundle, &frames, |frame, played| {
+        let name = |kind: &str| folder.join(format!("frame-{frame:04}-{kind}.png"));
+        let write = || {
+            let exact = verify::exact_frame(&flat.atlas, frame);
+            write_png(&name("exact"), gbuffer.width, &exact)?;
+            write_png(&name("played"), gbuffer.width, played)?;
+            let difference: Vec<u8> = exact.iter().zip(played).map(|(a, b)| a.abs_diff(*b).saturating_mul(GAIN)).collect();
+            write_png(&name("compare"), gbuffer.width * 3, &side_by_side(gbuffer.width, [&exact, played, &difference]))?;
+            rays::draw(flat, frame, report.grid.cell).write(&name("rays"))
+        };
+        if result.is_ok() {
+            result = write();
+        }
+    })?;
+    result
+}
+
+/// The source image; texels without a surface at half brightness, the labels' rectangles and the charts' outlines drawn over it.
+fn bordered(image: &SourceImage) -> Vec<u8> {
+    let (width, height) = (image.width as usize, image.height as usize);
+    let mut out: Vec<[u8; 3]> = image
+        .texels
+        .iter()
+        .zip(&image.covered)
+        .map(|(&texel, &covered)| {
+            let colour = image.palette.get(usize::from(texel)).copied().unwrap_or_default();
+            if covered { colour } else { colour.map(|v| v / 2) }
+        })
+        .collect();
+    let covered = |x: usize, y: usize| x < width && y < height && image.covered[y * width + x];
+    for y in 0..height {
+        for x in 0..width {
+            // A texel outside a chart with one inside beside it: the outline lies outside what is shown.
+            let beside = [(x.wrapping_sub(1), y), (x + 1, y), (x, y.wrapping_sub(1)), (x, y + 1)];
+            if !covered(x, y) && beside.iter().any(|&(x, y)| covered(x, y)) {
+                out[y * width + x] = BORDER;
+            }
+        }
+    }
+    out.concat()
+}
+
+/// Three pictures of `width` pixels a row as one.
+fn side_by_side(width: u32, pictures: [&[u8]; 3]) -> Vec<u8> {
+    let row = (width as usize * 3).max(1);
+    let rows = pictures[0].len() / row;
+    (0..rows).flat_map(|y| pictures.iter().flat_map(move |picture| &picture[y * row..(y + 1) * row])).copied().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use cubist_baker::job::{self, Options, TruthFrames};
+    use cubist_baker::scene::builtin;
+
+    #[test]
+    fn pictures_have_their_sizes_and_show_what_was_never_seen() {
+        let mut scene = builtin::build("columns").expect("a built-in scene");
+        (scene.playback.width, scene.playback.height, scene.playback.frames) = (64, 48, 5);
+        let baked = job::run(&scene, &Options { truth: TruthFrames::None, ..Options::default() }, &|_, _| {}).expect("a bundle");
+        let folder = tempfile::tempdir().expect("a folder");
+        write(folder.path(), &baked).expect("pictures");
+        let image = &baked.flat.atlas.image;
+        let tall = image.height * SIDE / image.width;
+        let mut sizes = vec![
+            ("source-image".to_owned(), [image.width, image.height]),
+            ("mask".to_owned(), [image.width, image.height]),
+            ("never-seen".to_owned(), [SIDE, tall]),
+            ("density".to_owned(), [SIDE, tall + maps::LEGEND]),
+        ];
+        for frame in [0, 2, 4] {
+            let kinds = [("exact", [64, 48]), ("played", [64, 48]), ("compare", [192, 48]), ("rays", [SIDE, tall])];
+            sizes.extend(kinds.map(|(kind, size)| (format!("frame-{frame:04}-{kind}"), size)));
+        }
+        let open = |name: &str| image::open(folder.path().join(format!("{name}.png"))).expect(name).into_rgb8();
+        for (name, size) in sizes {
+            let picture = open(&name);
+            assert_eq!([picture.width(), picture.height()], size, "{name}");
+        }
+        // Counted from the G-buffer alone.
+        let mut hidden = image.covered.clone();
+        for uv in baked.flat.atlas.gbuffer.uv.iter() {
+            hidden[uv[1] as usize * image.width as usize + uv[0] as usize] = false;
+        }
+        let never = hidden.iter().filter(|&&hidden| hidden).count();
+        let shown = open("never-seen").pixels().filter(|pixel| pixel.0 == maps::NEVER).count();
+        let square = (SIDE / image.width).pow(2) as usize;
+        assert!(never > 0 && shown == never * square, "{never} texels are never seen, {shown} pixels of {square} a texel say so");
+    }
+}
