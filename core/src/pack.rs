@@ -70,7 +70,7 @@ pub fn code<B: Bits>(bits: &mut B, Scratch { contexts, recent, .. }: Scratch<'_>
     }
 }
 
-/// Codes `picture`, of half a byte a texel, like [`code`]: as if a texel were a byte and its index the upper half of that.
+/// Codes `picture`, of half a byte a texel, like [`code`]: as if its texels were bytes.
 pub fn code_nibbles<B: Bits>(bits: &mut B, scratch: Scratch<'_>, picture: &mut Picture<'_>) {
     let Scratch { contexts, recent, rows } = scratch;
     contexts.fill(Probability::NEW);
@@ -147,7 +147,7 @@ impl Plane for Nibbles<'_> {
     fn load(&self, start: usize, own: &mut [u8], known: &mut [u8]) {
         let texels = self.texels.get(start >> 1..).unwrap_or(&[]);
         for ([low, high], two) in own.as_chunks_mut().0.iter_mut().zip(texels) {
-            (*low, *high) = (two << 4, two & 0xf0);
+            (*low, *high) = (two & 15, two >> 4);
         }
         covered(self.mask, start, known);
     }
@@ -155,7 +155,7 @@ impl Plane for Nibbles<'_> {
     fn store(&mut self, start: usize, own: &[u8]) {
         let texels = self.texels.get_mut(start >> 1..).unwrap_or(&mut []);
         for ([low, high], two) in own.as_chunks().0.iter().zip(texels) {
-            *two = low >> 4 | high & 0xf0;
+            *two = low & 15 | high << 4;
         }
     }
 }
@@ -227,14 +227,15 @@ impl Plane for Direct<'_> {
         if self.part == Part::Green {
             return covered(self.mask, start, known);
         }
-        // Where green is as to the left, the others most often are too.
-        let mut left = 0xffff;
+        // Where what is known of a texel is as to the left, the rest most often is too.
+        let all = if self.part == Part::Red { 0x07e0 } else { 0xffe0 };
+        let mut left = None;
         for (bits, texels) in known.iter_mut().zip(texels.chunks(8)) {
             *bits = 0;
             for (place, texel) in texels.iter().enumerate() {
-                let green = u16::from_le_bytes(*texel) >> 5 & 63;
-                *bits |= u8::from(green == left) << (place & 7);
-                left = green;
+                let own = Some(u16::from_le_bytes(*texel) & all);
+                *bits |= u8::from(own == left) << (place & 7);
+                left = own;
             }
         }
     }

@@ -34,17 +34,15 @@ type Seen = [f32; 3];
 struct Space {
     /// Linear light, 0..=1, by byte.
     linear: [f64; 256],
-    chroma: f64,
 }
 
 impl Space {
     fn new() -> Self {
-        let chroma = std::env::var("CHROMA").ok().and_then(|v| v.parse().ok()).unwrap_or(CHROMA);
         let light = |byte: usize| {
             let v = byte as f64 / 255.0;
             if v <= 0.04045 { v / 12.92 } else { libm::pow((v + 0.055) / 1.055, 2.4) }
         };
-        Self { linear: std::array::from_fn(light), chroma }
+        Self { linear: std::array::from_fn(light) }
     }
 
     fn seen(&self, rgb: [u8; 3]) -> Seen {
@@ -54,8 +52,8 @@ impl Space {
         let s = libm::cbrt(0.088_302_461_9 * r + 0.281_718_837_6 * g + 0.629_978_700_5 * b);
         [
             0.210_454_255_3 * l + 0.793_617_785_0 * m - 0.004_072_046_8 * s,
-            self.chroma * (1.977_998_495_1 * l - 2.428_592_205_0 * m + 0.450_593_709_9 * s),
-            self.chroma * (0.025_904_037_1 * l + 0.782_771_766_2 * m - 0.808_675_766_0 * s),
+            CHROMA * (1.977_998_495_1 * l - 2.428_592_205_0 * m + 0.450_593_709_9 * s),
+            CHROMA * (0.025_904_037_1 * l + 0.782_771_766_2 * m - 0.808_675_766_0 * s),
         ]
         .map(|v| v as f32)
     }
@@ -63,7 +61,7 @@ impl Space {
     /// The nearest bytes.
     fn bytes(&self, seen: Seen) -> [u8; 3] {
         let [light, a, b] = seen.map(f64::from);
-        let (a, b) = (a / self.chroma, b / self.chroma);
+        let (a, b) = (a / CHROMA, b / CHROMA);
         let cube = |v: f64| v * v * v;
         let l = cube(light + 0.396_337_777_4 * a + 0.215_803_757_3 * b);
         let m = cube(light - 0.105_561_345_8 * a - 0.063_854_172_8 * b);
