@@ -179,15 +179,15 @@ pub enum Storage {
 /// What a texel of the source image is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Texels {
-    /// A byte: one of 256 colours. Costs next to no quality, and draws fastest.
+    /// A byte: one of 256 colours. Loses next to no quality, and draws fastest.
     #[value(name = "8")]
     Eight,
-    /// Half a byte: one of 16 colours. Costs a tenth of a dB where colours are few, several where they are many; a pixel takes a few instructions
-    /// more.
+    /// Half a byte: one of 16 colours. Real scenes lost up to 0.2 dB against the antialiased scene; smooth gradients show bands. A pixel takes
+    /// about five instructions more.
     #[value(name = "4")]
     Four,
-    /// Two bytes: any colour of the display, no palette. Gains where 256 colours are too few; a pixel takes no look at a palette, but flash
-    /// delivers twice as much.
+    /// Two bytes: any colour of the display, no palette. Gradients of more than 256 colours show no bands; no real scene measured gained in dB. A
+    /// pixel takes two instructions more where the display swaps bytes, none else, but flash delivers twice as much.
     #[value(name = "565")]
     Direct,
 }
