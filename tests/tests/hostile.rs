@@ -550,7 +550,7 @@ fn texels_of_other_kinds_play_whatever_their_bytes() {
         let refused = |bytes: usize| Some(BundleError::Field { name: "ATLS palette bytes", found: bytes as u32 });
         let most = 2 * texels.colours();
         assert_eq!(field(&vec![7; most + 2]), refused(most + 2));
-        assert_eq!(field(&vec![7; 1]), refused(1));
+        assert_eq!(field(&[7]), refused(1));
         assert_eq!(field(&[]), if most == 0 { None } else { refused(0) });
         // Fewer colours than texels name: the others are black.
         assert!(most == 0 || survives(&with(&Atlas { palette: &atlas.palette[..2], ..atlas })));
