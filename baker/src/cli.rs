@@ -4,7 +4,7 @@
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use cubist_baker::atlas;
 use cubist_baker::{Goal, Options, TruthFrames};
-use cubist_core::format::{SPACE_CUBIC, SPACE_LINEAR, TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
+use cubist_core::format::{SPACE_CUBIC, SPACE_LINEAR, TIME_CUBIC, TIME_HOLD, TIME_LINEAR, TexelKind};
 use std::path::PathBuf;
 
 /// Bakes a 3D scene and a camera path into a small bundle that plays on microcontrollers.
@@ -33,6 +33,8 @@ Examples:
                                          for a player with 48 x 1024 bytes of working memory
   cubist-bake fox.glb -o fox.cubist --storage packed
                                          the source image coded: less flash, more memory
+  cubist-bake fox.glb -o fox.cubist --texels 4
+                                         16 colours: half the source image, for little where colours are few
   cubist-bake inspect fox.cubist         what a bundle holds, byte by section
 
 If something looks wrong, --diagnostics DIR shows the source image, and exact frames next to played ones.
@@ -90,9 +92,17 @@ pub struct Bake {
     /// Texels a pixel where a surface is seen closest, 0.05 to 8; 0.7 halves the source image.
     #[arg(long, value_name = "RATIO", default_value_t = atlas::Settings::default().density, value_parser = density)]
     pub density: f64,
-    /// Colours of the source image, at most, 2 to 256.
-    #[arg(long, value_name = "N", default_value_t = atlas::Settings::default().colours as u16, value_parser = clap::value_parser!(u16).range(2..=256))]
-    pub colours: u16,
+    /// What a texel of the source image is, and so what it costs.
+    ///
+    /// A player names the kinds it plays in its type: Player<Indexed8> (which Player alone means), Player<Indexed4>, Player<Direct565>, or
+    /// Player<AnyTexels>; a firmware links the code of no others. All kinds are stored --storage raw or packed.
+    #[arg(long, value_enum, value_name = "BITS", default_value_t = Texels::Eight)]
+    pub texels: Texels,
+    /// Colours of the source image, at most, 2 to 256; at most 16 with --texels 4, none with 565 [default: 256; 16 with --texels 4].
+    ///
+    /// They are chosen for what is seen, in Oklab, and rounded to what an RGB565 display shows. Fewer save next to nothing raw, but pack better.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(2..=256))]
+    pub colours: Option<u16>,
     /// How the bundle holds the source image [default: raw].
     ///
     /// Raw plays straight from flash, at no memory. Packed takes a tenth to a quarter of the bytes and is unpacked once, before the first frame,
@@ -172,6 +182,22 @@ pub enum Storage {
     Packed,
 }
 
+/// What a texel of the source image is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Texels {
+    /// A byte: one of 256 colours. Loses next to no quality, and draws fastest.
+    #[value(name = "8")]
+    Eight,
+    /// Half a byte: one of 16 colours. Real scenes lost up to 0.2 dB against the antialiased scene; smooth gradients show bands. A pixel takes
+    /// about five instructions more.
+    #[value(name = "4")]
+    Four,
+    /// Two bytes: any colour of the display, no palette. Gradients of more than 256 colours show no bands; no real scene measured gained in dB. A
+    /// pixel takes two instructions more where the display swaps bytes, none else, but flash delivers twice as much.
+    #[value(name = "565")]
+    Direct,
+}
+
 /// What replaces the scene's playback.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct Playback {
@@ -216,6 +242,18 @@ pub struct Throughput {
 }
 
 impl Bake {
+    /// What is wrong with options that do not go together.
+    #[must_use]
+    pub fn clash(&self) -> Option<String> {
+        match (self.texels, self.colours?) {
+            (Texels::Four, colours @ 17..) => Some(format!(
+                "--colours {colours}: expected at most 16, which is what --texels 4 can tell apart; lower it, or use --texels 8"
+            )),
+            (Texels::Direct, _) => Some("--colours: --texels 565 has no palette to limit; leave it out, or use --texels 8".to_owned()),
+            _ => None,
+        }
+    }
+
     /// The baker's options.
     #[must_use]
     pub fn options(&self, load_seconds: f64) -> Options {
@@ -231,6 +269,11 @@ impl Bake {
             Time::Cubic => TIME_CUBIC,
         };
         let storage = |storage| if storage == Storage::Raw { atlas::Storage::Raw } else { atlas::Storage::Packed };
+        let texels = match self.texels {
+            Texels::Eight => TexelKind::Indexed8,
+            Texels::Four => TexelKind::Indexed4,
+            Texels::Direct => TexelKind::Direct565,
+        };
         let space = |space| if space == Space::Linear { SPACE_LINEAR } else { SPACE_CUBIC };
         Options {
             cell: self.cell,
@@ -241,7 +284,8 @@ impl Bake {
             source: atlas::Settings {
                 max_side: self.atlas,
                 density: self.density,
-                colours: self.colours.into(),
+                texels,
+                colours: self.colours.map_or(texels.colours(), usize::from),
                 ..atlas::Settings::default()
             },
             storage: self.storage.map(storage),
@@ -363,6 +407,18 @@ mod tests {
         assert_eq!((options.time, options.space), (Some(TIME_LINEAR), Some(SPACE_CUBIC)));
         let packed = Cli::try_parse_from(["cubist-bake", "a.glb", "-o", "a.cubist", "--storage", "packed"]).unwrap().bake.options(0.0);
         assert_eq!(packed.source().storage, atlas::Storage::Packed);
+        let texels = |options: &[&str]| {
+            let given = ["cubist-bake", "a.glb", "-o", "a.cubist"].iter().chain(options);
+            let bake = Cli::try_parse_from(given).unwrap().bake;
+            let atlas::Settings { texels, colours, .. } = bake.options(0.0).source();
+            (bake.clash(), texels, colours)
+        };
+        assert_eq!(texels(&[]), (None, TexelKind::Indexed8, 256));
+        assert_eq!(texels(&["--texels", "4"]), (None, TexelKind::Indexed4, 16));
+        assert_eq!(texels(&["--texels", "4", "--colours", "9"]), (None, TexelKind::Indexed4, 9));
+        assert_eq!(texels(&["--texels", "565"]).1, TexelKind::Direct565);
+        assert!(texels(&["--texels", "4", "--colours", "17"]).0.unwrap().contains("at most 16"));
+        assert!(texels(&["--texels", "565", "--colours", "16"]).0.unwrap().contains("no palette"));
         assert!(Cli::try_parse_from(["cubist-bake", "inspect", "a.cubist", "--json"]).unwrap().command.is_some());
         for wrong in [
             &["cubist-bake", "a.toml"][..],
@@ -372,6 +428,7 @@ mod tests {
             &["cubist-bake", "a.toml", "-o", "b", "--time", "square"],
             &["cubist-bake", "a.toml", "-o", "b", "--space", "hold"],
             &["cubist-bake", "a.toml", "-o", "b", "--storage", "zip"],
+            &["cubist-bake", "a.toml", "-o", "b", "--texels", "16"],
             &["cubist-bake", "a.toml", "-o", "b", "--cell", "7"],
             &["cubist-bake", "a.toml", "-o", "b", "--psnr", "nan"],
             &["cubist-bake", "a.toml", "-o", "b", "--atlas", "32"],

@@ -2,7 +2,9 @@
 //! Bytes come from a file or the encoder; figures go to `cubist-bake inspect` and to the report's byte counts.
 
 use crate::encode::unpacked;
-use cubist_core::format::{ATLAS, FIXED, INFO, LABELS, MASK, MASKED, PACKED, PATH, SPACE_LINEAR, STRIP, TIME_HOLD, TIME_LINEAR, VERSION};
+use cubist_core::format::{
+    ATLAS, FIXED, INFO, LABELS, MASK, MASKED, PATH, SPACE_LINEAR, STRIP, TIME_HOLD, TIME_LINEAR, TexelKind, VERSION,
+};
 use cubist_core::plane::Plane;
 use cubist_core::{Bundle, BundleError};
 use serde::Serialize;
@@ -103,13 +105,17 @@ pub struct PathInfo {
 pub struct ImageInfo {
     /// Texels a row and rows.
     pub size: [u32; 2],
-    /// How texels are stored: 0 raw, 1 packed.
+    /// What a texel is.
+    pub texels: TexelKind,
+    /// How texels are stored, as the bundle numbers it: raw 0, 2, 4; packed 1, 3, 5.
     pub encoding: u8,
+    /// Texels and mask are coded, and unpacked into working memory.
+    pub packed: bool,
     /// Bytes of texels and mask, as they are stored.
     pub stored_bytes: usize,
     /// Bytes of texels and mask, raw.
     pub raw_bytes: usize,
-    /// Palette entries.
+    /// Palette entries; 0 where texels are colours themselves.
     pub colours: usize,
     /// Texels that belong to a chart; `None`: no label is masked.
     pub covered_texels: Option<u64>,
@@ -240,7 +246,9 @@ impl Inspection {
                 .collect(),
             image: ImageInfo {
                 size: [1 << atlas.width_log2, u32::from(atlas.height)],
+                texels: bundle.texel_kind(),
                 encoding: atlas.encoding,
+                packed: bundle.packed().is_some(),
                 stored_bytes: bundle.packed().map_or(raw_bytes, <[u8]>::len),
                 raw_bytes,
                 colours: atlas.palette.len() / 2,
@@ -278,7 +286,7 @@ impl Inspection {
     /// Bytes of working memory that the unpacked source image takes; 0 where it is raw.
     #[must_use]
     pub fn unpacked_bytes(&self) -> usize {
-        if self.image.encoding == PACKED { self.image.raw_bytes } else { 0 }
+        if self.image.packed { self.image.raw_bytes } else { 0 }
     }
 
     /// The inspection as lines of text.
@@ -336,7 +344,7 @@ impl Inspection {
         let covered = image
             .covered_texels
             .map_or_else(|| "all".to_owned(), |n| format!("{n}, {:.1} %", 100.0 * n as f64 / f64::from(image.size[0] * image.size[1])));
-        line(format!("ATLS  {} x {} texels, {} colours; covered: {covered}", image.size[0], image.size[1], image.colours));
+        line(format!("ATLS  {} x {} texels, {}; covered: {covered}", image.size[0], image.size[1], image.texel()));
         line(format!("      {}", image.storage()));
         for (index, row) in self.palette.chunks(12).enumerate() {
             line(format!("      colours from {:>3}  {}", index * 12, row.join(" ")));
@@ -365,10 +373,19 @@ impl Inspection {
 }
 
 impl ImageInfo {
+    /// What a texel is.
+    fn texel(&self) -> String {
+        match self.texels {
+            TexelKind::Indexed8 => format!("8 bits each, {} colours", self.colours),
+            TexelKind::Indexed4 => format!("4 bits each, {} colours", self.colours),
+            TexelKind::Direct565 => "RGB565 each, no palette".to_owned(),
+        }
+    }
+
     /// How the image is stored, and what that takes.
     fn storage(&self) -> String {
-        let Self { encoding, stored_bytes, raw_bytes, .. } = *self;
-        if encoding == PACKED {
+        let Self { packed, stored_bytes, raw_bytes, .. } = *self;
+        if packed {
             let percent = 100.0 * stored_bytes as f64 / raw_bytes.max(1) as f64;
             format!("packed: {stored_bytes} bytes with the mask, {percent:.1} % of the {raw_bytes} that it takes in working memory")
         } else {

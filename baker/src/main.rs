@@ -40,6 +40,9 @@ fn bake(name: &str, output: &Path, args: &Bake) -> Result<()> {
     files::clean_up_when_interrupted()?;
     threads(args.threads)?;
     distinct(name, output, args.report.as_deref());
+    if let Some(clash) = args.clash() {
+        Cli::command().error(ErrorKind::ArgumentConflict, clash).exit();
+    }
     files::check(output)?;
     if let Some(path) = &args.report {
         files::check(path)?;

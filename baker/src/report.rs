@@ -7,7 +7,7 @@ use crate::causes::Causes;
 use crate::inspect::Inspection;
 use crate::scene::Scene;
 use crate::verify::{Quality, TruthQuality, Work};
-use cubist_core::format::{ATLAS, LABELS, MASK};
+use cubist_core::format::{ATLAS, LABELS, MASK, TexelKind};
 use serde::{Deserialize, Serialize};
 
 /// Below this share of the resolution asked for, the source image is called too small.
@@ -84,7 +84,9 @@ pub struct Source {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// Palette entries.
+    /// What a texel is.
+    pub texels: TexelKind,
+    /// Colours: palette entries, or where texels are colours themselves, how many different ones there are.
     pub colours: usize,
     /// How it is stored.
     pub storage: Storage,
@@ -184,6 +186,7 @@ impl Report {
             source_image: Source {
                 width: image.width,
                 height: image.height,
+                texels: image.kind,
                 colours: image.palette.len(),
                 storage: settings.atlas.storage,
                 stored_bytes: inspection.image.stored_bytes,
@@ -210,7 +213,7 @@ impl Report {
             quality_vs_truth: truth,
             work,
             torn_by_cause: encoded.torn_by_cause,
-            effects: vec!["palette".to_owned()],
+            effects: if image.kind.colours() > 0 { vec!["palette".to_owned()] } else { Vec::new() },
             warnings: scene.warnings.iter().cloned().chain(warnings(origin)).collect(),
         }
     }
@@ -298,10 +301,15 @@ pub fn table(report: &Report) -> Vec<(String, String)> {
     row(
         "source image",
         format!(
-            "{} bytes: {} x {} texels, {} colours, {:.0} % covered; {}",
+            "{} bytes: {} x {} texels of {}, {} colours, {:.0} % covered; {}",
             grouped(bytes.atlas),
             image.width,
             image.height,
+            match image.texels {
+                TexelKind::Indexed8 => "8 bits",
+                TexelKind::Indexed4 => "4 bits",
+                TexelKind::Direct565 => "RGB565",
+            },
             image.colours,
             100.0 * image.fill,
             match image.storage {

@@ -9,7 +9,7 @@ use crate::gbuffer::GBuffer;
 use crate::metrics::{self, Histogram};
 use crate::truth::Truth;
 use cubist_core::fixed::{PLAY_BITS, PlayUv};
-use cubist_core::{Bundle, Frame, Player, Probe};
+use cubist_core::{AnyTexels, Bundle, Frame, Player, Probe};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -111,14 +111,14 @@ pub fn rgb(pixel: u16) -> [u8; 3] {
 
 /// Renders frames of a bundle into memory of its own.
 pub struct Screen<'p, 'a> {
-    player: &'p mut Player<'a>,
+    player: &'p mut Player<'a, AnyTexels>,
     row: Vec<u16>,
     height: u32,
 }
 
 impl<'p, 'a> Screen<'p, 'a> {
     /// A screen for what `player` plays.
-    pub fn new(player: &'p mut Player<'a>) -> Self {
+    pub fn new(player: &'p mut Player<'a, AnyTexels>) -> Self {
         let (width, height) = player.bundle().size();
         Self { player, row: vec![0; width as usize], height }
     }
@@ -153,7 +153,7 @@ impl<'p, 'a> Screen<'p, 'a> {
 /// Runs `then` with a player of `bundle` in memory of its own.
 fn with_screen<R>(bundle: &Bundle<'_>, then: impl FnOnce(Screen<'_, '_>) -> R) -> Result<R, VerifyError> {
     let mut memory = vec![0; bundle.memory_needed()];
-    let mut player = Player::new(bundle, &mut memory)?;
+    let mut player = Player::<AnyTexels>::with_texels(bundle, &mut memory)?;
     Ok(then(Screen::new(&mut player)))
 }
 
@@ -332,7 +332,7 @@ pub fn work(bytes: &[u8]) -> Result<Work, VerifyError> {
     let bundle = Bundle::parse(bytes)?;
     let ((width, height), frames) = (bundle.size(), bundle.frames());
     let mut memory = vec![0; bundle.memory_needed()];
-    let mut player = Player::new(&bundle, &mut memory)?;
+    let mut player = Player::<AnyTexels>::with_texels(&bundle, &mut memory)?;
     // A new player holds the first keys already: starting from the end, frame 0 is charged for them like any other.
     player.seek(Frame(frames - 1));
     let mut row = vec![0u16; width as usize];

@@ -6,7 +6,7 @@ use cubist_baker::encode::{self, CodingSettings, Content, Exceeded, Header};
 use cubist_baker::gbuffer::GBuffer;
 use cubist_baker::sheets::{self, KeyGrid, Layers};
 use cubist_baker::{fields, fit, order};
-use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
+use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC, TIME_HOLD, TIME_LINEAR, TexelKind};
 use cubist_core::{Bundle, Frame, Player};
 
 const SIZE: [u32; 2] = [100, 60];
@@ -20,9 +20,10 @@ fn gbuffer(looping: bool) -> (GBuffer, SourceImage) {
         Label { rect: [8, 0, 150, 80], masked: false, fixed: None },
         Label { rect: [160, 4, 190, 44], masked: false, fixed: None },
     ];
-    let texels = (0..width * height).map(|i| ((i % width) * 7 + (i / width) * 13) as u8).collect();
+    let texels = (0..width * height).map(|i| u16::from(((i % width) * 7 + (i / width) * 13) as u8)).collect();
     let palette = (0..=255u8).map(|i| [i & 0xf8, i & 0xfc, (i << 3) & 0xf8]).collect();
-    let image = SourceImage { width, height, texels, palette, covered: vec![true; (width * height) as usize], labels };
+    let image =
+        SourceImage { width, height, kind: TexelKind::Indexed8, texels, palette, covered: vec![true; (width * height) as usize], labels };
     let mut gbuffer = GBuffer { width: SIZE[0], height: SIZE[1], frames: FRAMES, label: Vec::new(), uv: Default::default() };
     let mut places = Vec::new();
     for frame in 0..FRAMES {

@@ -6,7 +6,7 @@ use crate::fixed::{PLAY_BITS, PlayUv};
 /// The colour plane and the mask.
 #[derive(Clone, Copy, Debug)]
 pub struct Texture<'a> {
-    /// One palette index a texel, row by row.
+    /// Texels of the bundle's [`crate::format::TexelKind`], row by row.
     pub texels: &'a [u8],
     /// One bit a texel, least significant first; empty where no label is masked.
     pub mask: &'a [u8],
@@ -21,12 +21,6 @@ impl Texture<'_> {
     #[must_use]
     pub const fn index(&self, uv: PlayUv) -> usize {
         ((uv.v >> PLAY_BITS << self.width_log2) | (uv.u >> PLAY_BITS)) as u32 as usize
-    }
-
-    /// The palette index at `uv`; 0 outside.
-    #[must_use]
-    pub fn texel(&self, uv: PlayUv) -> u8 {
-        self.texels.get(self.index(uv)).copied().unwrap_or(0)
     }
 
     /// Whether the texel at `uv` belongs to a chart.

@@ -6,7 +6,7 @@ use crate::atlas::Texture;
 use crate::fixed::KEY_BITS;
 use crate::format::{
     self, ATLAS, Atlas, Envelope, FIXED, INFO, KEY_BYTES, KNOWN_FLAGS, KeyEntry, LABEL_BYTES, LABELS, LabelRecord, MAGIC, MASK, MASKED,
-    MAX_SECTIONS, MAX_SHEETS, PACKED, PATH, Path, RAW, SPACE_CUBIC, Section, TIME_CUBIC, VERSION,
+    MAX_SECTIONS, MAX_SHEETS, PACKED, PATH, Path, SPACE_CUBIC, Section, TIME_CUBIC, TexelKind, VERSION,
 };
 use crate::grid::Grid;
 use crate::plane::{CAMERA_BYTES, Camera, PLANE_BYTES};
@@ -169,6 +169,12 @@ impl<'a> Bundle<'a> {
         Grid::new(self.path.width, self.path.height, self.path.cell_log2)
     }
 
+    /// What a texel of the source image is.
+    #[must_use]
+    pub fn texel_kind(&self) -> TexelKind {
+        TexelKind::of(self.atlas.encoding).unwrap_or_default()
+    }
+
     /// Texels of the source image.
     #[must_use]
     pub fn texel_count(&self) -> usize {
@@ -184,7 +190,7 @@ impl<'a> Bundle<'a> {
     /// The coded mask and texels of a bundle that holds them packed; `None`: they are raw.
     #[must_use]
     pub fn packed(&self) -> Option<&'a [u8]> {
-        (self.atlas.encoding == PACKED).then_some(self.atlas.texels)
+        packs(&self.atlas).then_some(self.atlas.texels)
     }
 
     /// The source image as far as it is borrowed: where it is packed, its size alone.
@@ -218,15 +224,20 @@ fn length(expected: usize, found: usize, name: &'static str) -> Result<(), Bundl
     if expected == found { Ok(()) } else { Err(BundleError::Length { name, expected, found }) }
 }
 
+fn packs(atlas: &Atlas<'_>) -> bool {
+    atlas.encoding & PACKED != 0
+}
+
 fn check_atlas(atlas: &Atlas<'_>) -> Result<(), BundleError> {
     field((4..=10).contains(&atlas.width_log2), "ATLS width_log2", u32::from(atlas.width_log2))?;
     field((1..=1024).contains(&atlas.height), "ATLS height", u32::from(atlas.height))?;
-    field(atlas.encoding <= PACKED, "ATLS encoding", u32::from(atlas.encoding))?;
-    if atlas.encoding == RAW {
-        length(usize::from(atlas.height) << atlas.width_log2, atlas.texels.len(), "ATLS texels")?;
+    let Some(kind) = TexelKind::of(atlas.encoding) else { return field(false, "ATLS encoding", u32::from(atlas.encoding)) };
+    if !packs(atlas) {
+        length(kind.bytes(usize::from(atlas.height) << atlas.width_log2), atlas.texels.len(), "ATLS texels")?;
     }
-    let entries = atlas.palette.len() / 2;
-    field((1..=256).contains(&entries) && atlas.palette.len().is_multiple_of(2), "ATLS palette bytes", atlas.palette.len() as u32)
+    let (entries, most) = (atlas.palette.len() / 2, kind.colours());
+    let some = (most.min(1)..=most).contains(&entries);
+    field(some && atlas.palette.len().is_multiple_of(2), "ATLS palette bytes", atlas.palette.len() as u32)
 }
 
 fn check_labels<'a>(labels: &[[u8; LABEL_BYTES]], atlas: &Atlas<'_>, mask: &'a [u8]) -> Result<&'a [u8], BundleError> {
@@ -240,7 +251,7 @@ fn check_labels<'a>(labels: &[[u8; LABEL_BYTES]], atlas: &Atlas<'_>, mask: &'a [
         field(label.flags & (MASKED | FIXED) != MASKED | FIXED, "LABL flags", u32::from(label.flags))?;
     }
     // A packed picture brings its mask along.
-    if !masked || atlas.encoding == PACKED {
+    if !masked || packs(atlas) {
         return Ok(&[]);
     }
     length((usize::from(atlas.height) << atlas.width_log2) / 8, mask.len(), "MASK")?;

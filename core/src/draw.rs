@@ -2,7 +2,6 @@
 //! The plan is in the caller's memory; pixels go to the caller's row, as `player` asks.
 
 use crate::Bundle;
-use crate::atlas::Texture;
 use crate::coverage::Chart;
 use crate::fixed::PlayUv;
 use crate::format::{LabelRecord, STRIP};
@@ -24,47 +23,6 @@ pub trait Paint {
 
     /// A run's pixels, in windows of 2^ROWS rows of 2^WIDTH texels, `TEXELS` in all; `log2`: of a block's pixels.
     fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [Self::Pixel], log2: u32);
-}
-
-/// Colours, by way of the source image.
-#[derive(Debug)]
-pub struct Colours<'t> {
-    /// The source image.
-    pub texture: Texture<'t>,
-    /// The colours of its texels.
-    pub palette: &'t [u16; 256],
-}
-
-impl Colours<'_> {
-    #[inline(always)]
-    fn colour(&self, texel: u8) -> u16 {
-        self.palette.get(usize::from(texel)).copied().unwrap_or(0)
-    }
-}
-
-impl Paint for Colours<'_> {
-    type Pixel = u16;
-    const OFTEN: bool = true;
-
-    #[inline(always)]
-    fn at(&self, uv: PlayUv, _: u8) -> u16 {
-        self.colour(self.texture.texel(uv))
-    }
-
-    // A function of its own: the loop needs all registers.
-    #[inline(never)]
-    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [u16], log2: u32) {
-        let from = usize::from(run.row).wrapping_shl(WIDTH);
-        // The plan keeps windows inside the picture.
-        let Some(window) = self.texture.texels.get(from..).and_then(<[u8]>::first_chunk::<TEXELS>) else { return };
-        let make = |at: Packed<WIDTH, ROWS>| self.colour(window.get(at.texel()).copied().unwrap_or(0));
-        // Blocks of four in a picture 512 wide are the rule, and have a loop of their own.
-        if (WIDTH, log2) == (9, 2) {
-            span::run::<_, WIDTH, ROWS, 4>(edges, out, make);
-        } else {
-            span::any_run(edges, out, log2, make);
-        }
-    }
 }
 
 /// Where pixels come from.

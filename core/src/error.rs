@@ -1,6 +1,7 @@
 //! What can go wrong at the two doors: parsing a bundle, giving a player its memory.
 //! Rendering has no errors: after `parse` every accessor is total.
 
+use crate::format::TexelKind;
 use core::fmt;
 
 /// Why bytes are not a bundle that this player can show.
@@ -97,7 +98,7 @@ impl fmt::Display for Tag {
     }
 }
 
-/// Why a player cannot work with the memory it was given.
+/// Why there is no player of a bundle in the memory it was given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum MemoryError {
@@ -108,12 +109,26 @@ pub enum MemoryError {
         /// Bytes given.
         given: usize,
     },
+    /// The bundle's texels are of another kind than those that the player's type names ([`crate::Texels`]).
+    Texels {
+        /// What the bundle needs a player of.
+        needed: TexelKind,
+    },
 }
 
 impl fmt::Display for MemoryError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self::TooSmall { needed, given } = *self;
-        write!(f, "this bundle needs {needed} bytes of working memory, {given} were given")
+        match *self {
+            Self::TooSmall { needed, given } => write!(f, "this bundle needs {needed} bytes of working memory, {given} were given"),
+            Self::Texels { needed } => {
+                let (texels, player) = match needed {
+                    TexelKind::Indexed8 => ("8-bit indices", "Player<Indexed8>"),
+                    TexelKind::Indexed4 => ("4-bit indices", "Player<Indexed4>"),
+                    TexelKind::Direct565 => ("RGB565", "Player<Direct565>"),
+                };
+                write!(f, "this bundle's texels are {texels}, which a {player} or a Player<AnyTexels> plays, and this player does not")
+            }
+        }
     }
 }
 

@@ -49,10 +49,66 @@ pub struct Section<'a> {
     pub bytes: &'a [u8],
 }
 
-/// [`Atlas::encoding`]: one palette index a texel, and the mask in a section of its own. Both are borrowed where they lie.
+/// [`Atlas::encoding`]: texels as they are read, and the mask in a section of its own. Both are borrowed where they lie.
 pub const RAW: u8 = 0;
-/// [`Atlas::encoding`]: mask and texels coded as [`crate::pack`] says, and unpacked into the caller's memory.
+/// [`Atlas::encoding`], added to a [`TexelKind::encoding`]: mask and texels coded as [`crate::pack`] says, and unpacked into the caller's memory.
 pub const PACKED: u8 = 1;
+
+/// What a texel of the source image is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TexelKind {
+    /// A byte: an index of a palette of at most 256 colours.
+    #[default]
+    Indexed8,
+    /// Half a byte, the first texel in the lower one: an index of a palette of at most 16 colours.
+    Indexed4,
+    /// Two bytes, little-endian: RGB565, no palette.
+    Direct565,
+}
+
+impl TexelKind {
+    /// The kind of an [`Atlas::encoding`]; `None` where this version knows none.
+    #[must_use]
+    pub const fn of(encoding: u8) -> Option<Self> {
+        match encoding & !PACKED {
+            0 => Some(Self::Indexed8),
+            2 => Some(Self::Indexed4),
+            4 => Some(Self::Direct565),
+            _ => None,
+        }
+    }
+
+    /// The [`Atlas::encoding`] of texels of this kind, [`RAW`].
+    #[must_use]
+    pub const fn encoding(self) -> u8 {
+        match self {
+            Self::Indexed8 => 0,
+            Self::Indexed4 => 2,
+            Self::Direct565 => 4,
+        }
+    }
+
+    /// Bytes of `texels` texels, an even number.
+    #[must_use]
+    pub const fn bytes(self, texels: usize) -> usize {
+        match self {
+            Self::Indexed8 => texels,
+            Self::Indexed4 => texels >> 1,
+            Self::Direct565 => texels.saturating_mul(2),
+        }
+    }
+
+    /// The most colours of a palette; 0: there is none.
+    #[must_use]
+    pub const fn colours(self) -> usize {
+        match self {
+            Self::Indexed8 => 256,
+            Self::Indexed4 => 16,
+            Self::Direct565 => 0,
+        }
+    }
+}
 
 /// The source image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -61,9 +117,9 @@ pub struct Atlas<'a> {
     pub width_log2: u8,
     /// Rows, 1..=1024.
     pub height: u16,
-    /// [`RAW`] or [`PACKED`].
+    /// The [`TexelKind::encoding`], [`RAW`] or [`PACKED`].
     pub encoding: u8,
-    /// RGB565, little-endian, at most 256 entries.
+    /// RGB565, little-endian, at most [`TexelKind::colours`] entries.
     pub palette: &'a [u8],
     /// Row by row, from the top; packed: the coded mask and texels.
     pub texels: &'a [u8],

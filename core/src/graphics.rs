@@ -8,7 +8,7 @@
 //! }
 //! ```
 
-use crate::{Bundle, Player};
+use crate::{Bundle, Indexed8, Player, Texels};
 use core::cell::RefCell;
 use embedded_graphics_core::draw_target::DrawTarget;
 use embedded_graphics_core::geometry::{OriginDimensions, Point, Size};
@@ -19,16 +19,16 @@ use embedded_graphics_core::primitives::Rectangle;
 
 /// The current frame of a player, drawn row by row.
 #[derive(Debug)]
-pub struct FrameImage<'p, 'a> {
+pub struct FrameImage<'p, 'a, T = Indexed8> {
     /// Drawing takes `&self` in embedded-graphics; the player's row state lives in its memory.
-    state: RefCell<(&'p mut Player<'a>, &'p mut [u16])>,
+    state: RefCell<(&'p mut Player<'a, T>, &'p mut [u16])>,
     size: Size,
 }
 
-impl<'a> Player<'a> {
+impl<'a, T: Texels> Player<'a, T> {
     /// The current frame as an embedded-graphics image; `row` is a buffer of at least the screen's
     /// width (pixels past a shorter one are not drawn). The player's byte order must be native.
-    pub fn image<'p>(&'p mut self, row: &'p mut [u16]) -> FrameImage<'p, 'a> {
+    pub fn image<'p>(&'p mut self, row: &'p mut [u16]) -> FrameImage<'p, 'a, T> {
         let size = self.bundle().size_of_screen();
         FrameImage { state: RefCell::new((self, row)), size }
     }
@@ -47,13 +47,13 @@ impl OriginDimensions for Bundle<'_> {
     }
 }
 
-impl OriginDimensions for FrameImage<'_, '_> {
+impl<T> OriginDimensions for FrameImage<'_, '_, T> {
     fn size(&self) -> Size {
         self.size
     }
 }
 
-impl ImageDrawable for FrameImage<'_, '_> {
+impl<T: Texels> ImageDrawable for FrameImage<'_, '_, T> {
     type Color = Rgb565;
 
     fn draw<D: DrawTarget<Color = Rgb565>>(&self, target: &mut D) -> Result<(), D::Error> {

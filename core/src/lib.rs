@@ -53,7 +53,7 @@
 //!    **field**, the signed distance on the screen from the outline, is above zero; layers carry it, and it is interpolated like a
 //!    position, in time always straight. Or both. What is so thin that both its sides pass through one cell is a **strip**: its
 //!    layers carry two fields, the distances from either side, and both have to be above zero.
-//! 4. **Colour.** One texel, one palette entry.
+//! 4. **Colour.** One texel, and where it is an index, one palette entry.
 //!
 //! No triangles, no depth, and no division for a pixel: perspective is in the keys. What a frame costs follows from the screen and the
 //! bundle's [`format::Limits`], not from how many triangles the scene had.
@@ -69,7 +69,8 @@
 //! the ring stands takes fewer keys. On a looping path the first key follows the last, so that the ring simply goes on.
 //!
 //! The source image's texels are read where the bundle lies, in flash, or, where the bundle holds them packed ([`pack`]), from the
-//! caller's memory, where [`Player::new`] unpacks them.
+//! caller's memory, where [`Player::new`] unpacks them. A texel is an index of a palette, of eight bits or four, or a colour
+//! ([`format::TexelKind`]); a player's type names those that it plays ([`Texels`]), and a firmware links the code of no others.
 //!
 //! # What holds
 //!
@@ -106,16 +107,20 @@ pub mod pack;
 mod plan;
 pub mod plane;
 mod player;
+mod playing;
 mod predict;
 pub mod record;
 mod row;
 mod sheet;
 mod span;
+mod texels;
 pub mod timeline;
 mod work;
 
 pub use bundle::{Bundle, checksum};
 pub use error::{BundleError, MemoryError};
 pub use graphics::FrameImage;
-pub use player::{ByteOrder, Frame, Player};
+pub use player::Player;
+pub use playing::{ByteOrder, Frame};
+pub use texels::{AnyTexels, Direct565, Indexed4, Indexed8, Texels};
 pub use work::{Probe, Work};

@@ -4,11 +4,11 @@
 use crate::Bundle;
 use crate::atlas::Texture;
 use crate::coder::{Decoder, Probability};
-use crate::format::{self, SPACE_CUBIC};
+use crate::format::{self, SPACE_CUBIC, TexelKind};
 use crate::key::Key;
 use crate::lists::{self, Lists};
 use crate::nodes;
-use crate::pack::{self, Picture, Recent};
+use crate::pack::{self, Picture, Recent, Scratch};
 use crate::plan::{Edge, Mixed, Plan, Run};
 use crate::record::Stream;
 use crate::row::{Layer, NodeRow};
@@ -65,24 +65,32 @@ impl<'m> Cutter<'m> {
     }
 }
 
-/// The source image: a packed one is unpacked here.
-// Rarely called and long: in one place, whoever cuts memory.
+/// The source image: a packed one is unpacked by `unpack`.
+// Rarely called and long: in one place for all that unpack alike.
 #[inline(never)]
-fn picture<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>) -> Texture<'m> {
+fn picture<'m>(
+    bundle: &Bundle<'m>,
+    cutter: &mut Cutter<'m>,
+    unpack: impl Fn(&mut Decoder<'_>, Scratch<'_>, &mut Picture<'_>),
+) -> Texture<'m> {
     let texture = bundle.texture();
     let Some(packed) = bundle.packed() else { return texture };
-    let texels = cutter.take(bundle.texel_count());
+    let (kind, width_log2) = (bundle.texel_kind(), texture.width_log2);
+    let texels = cutter.take(kind.bytes(bundle.texel_count()));
     let mask = cutter.take(if bundle.masked() { bundle.texel_count() / 8 } else { 0 });
     // What unpacking needs lies where playback's own memory will.
     let mut rest = Cutter { rest: &mut *cutter.rest, words: cutter.words, unpacking: 0 };
-    let (contexts, recent) = (rest.take::<Probability>(pack::CONTEXTS), rest.take::<Recent>(pack::INDICES));
+    let scratch = Scratch {
+        contexts: rest.take::<Probability>(pack::CONTEXTS),
+        recent: rest.take::<Recent>(pack::INDICES),
+        rows: rest.take(if kind == TexelKind::Indexed8 { 0 } else { pack::row_bytes(width_log2) }),
+    };
     cutter.unpacking = rest.words;
-    // Where memory is only counted, there is none: nothing is unpacked.
-    pack::code(&mut Decoder::new(packed), contexts, recent, &mut Picture { width_log2: texture.width_log2, texels, mask });
+    unpack(&mut Decoder::new(packed), scratch, &mut Picture { width_log2, texels, mask });
     Texture { texels, mask, ..texture }
 }
 
-fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
+fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, texture: Texture<'m>) -> Workspace<'m> {
     let (grid, limits) = (bundle.grid(), bundle.limits());
     let (key_layers, row_layers) = (usize::from(limits.key_layers), usize::from(limits.row_layers));
     let (back, ahead) = format::reach(bundle.path().time);
@@ -105,8 +113,8 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>) -> Workspace<'m> {
         }
     };
     Workspace {
-        texture: picture(bundle, cutter),
-        palette: cutter.take(256),
+        texture,
+        palette: cutter.take(bundle.texel_kind().colours()),
         stream: Stream {
             list_contexts: cutter.take(lists::CONTEXTS),
             key_contexts: cutter.take(nodes::CONTEXTS),
@@ -157,16 +165,22 @@ impl Bundle<'_> {
     #[must_use]
     pub fn memory_needed(&self) -> usize {
         let mut counter = Cutter::new(&mut []);
-        let _ = cut(self, &mut counter);
+        let texture = picture(self, &mut counter, |_, _, _| {});
+        let _ = cut(self, &mut counter, texture);
         counter.needed().saturating_mul(4).saturating_add(3)
     }
 }
 
-/// `memory` cut up for `bundle`; `None` where it is too small.
-pub fn workspace<'m>(bundle: &Bundle<'m>, memory: &'m mut [u8]) -> Option<Workspace<'m>> {
+/// `memory` cut up for `bundle`, whose source image `unpack` unpacks if it is packed; `None` where it is too small.
+pub fn workspace<'m>(
+    bundle: &Bundle<'m>,
+    memory: &'m mut [u8],
+    unpack: impl Fn(&mut Decoder<'_>, Scratch<'_>, &mut Picture<'_>),
+) -> Option<Workspace<'m>> {
     let (_, words, _) = bytemuck::pod_align_to_mut::<u8, u32>(memory);
     let given = words.len();
     let mut cutter = Cutter::new(words);
-    let workspace = cut(bundle, &mut cutter);
+    let texture = picture(bundle, &mut cutter, unpack);
+    let workspace = cut(bundle, &mut cutter, texture);
     (cutter.needed() <= given).then_some(workspace)
 }

@@ -3,6 +3,8 @@
 //!
 //! Most texels are what one beside them is; of the others most are what was seen before below the same texel; the rest are spelt out,
 //! bit by bit, near what the texels around them would go on to. How likely each is follows from how much those agree.
+//!
+//! That is said of bytes. Texels that are no bytes are coded as planes of them: see [`code_nibbles`] and [`code_direct`].
 
 use crate::coder::{Bits, Probability};
 use heapless::Vec;
@@ -29,26 +31,33 @@ const SPELT_BITS: u32 = 3;
 /// Contexts of spelling out: a tree of the bits above for each prediction.
 const SPELT: usize = INDICES << SPELT_BITS;
 
+/// What coding works in, whatever it holds.
+#[derive(Debug)]
+pub struct Scratch<'s> {
+    /// [`CONTEXTS`] of them.
+    pub contexts: &'s mut [Probability],
+    /// [`INDICES`] of them.
+    pub recent: &'s mut [Recent],
+    /// [`row_bytes`] of them; none for texels of a byte.
+    pub rows: &'s mut [u8],
+}
+
 /// A picture as it is coded: an encoder finds here what to code, a decoder leaves here what it read.
 #[derive(Debug)]
 pub struct Picture<'p> {
     /// A row is 2^this texels.
     pub width_log2: u32,
-    /// One palette index a texel, row by row.
+    /// Texels, row by row.
     pub texels: &'p mut [u8],
     /// One bit a texel, least significant first: does it belong to a chart? Empty: all do.
     pub mask: &'p mut [u8],
 }
 
-/// Codes `picture`, its mask first, in `contexts` ([`CONTEXTS`] of them) and `recent` ([`INDICES`] of them), whatever these hold.
-pub fn code<B: Bits>(bits: &mut B, contexts: &mut [Probability], recent: &mut [Recent], picture: &mut Picture<'_>) {
+/// Codes `picture`, of a byte a texel, its mask first.
+pub fn code<B: Bits>(bits: &mut B, Scratch { contexts, recent, .. }: Scratch<'_>, picture: &mut Picture<'_>) {
     contexts.fill(Probability::NEW);
     code_mask(bits, contexts, picture);
-    contexts.fill(Probability::NEW);
-    recent.fill([0; WAYS]);
-    let Some((same, rest)) = contexts.split_at_mut_checked(SAME) else { return };
-    let Some((again, spelt)) = rest.split_at_mut_checked(AGAIN) else { return };
-    let mut models = Models { same, again, spelt, recent };
+    let Some(mut models) = Models::new(contexts, recent) else { return };
     let Picture { width_log2, texels, mask } = picture;
     let width = 1usize.wrapping_shl(*width_log2);
     for row in 0..texels.len().wrapping_shr(*width_log2) {
@@ -58,6 +67,184 @@ pub fn code<B: Bits>(bits: &mut B, contexts: &mut [Probability], recent: &mut [R
         let above = |rows: usize| done.get(start.wrapping_sub(width.wrapping_mul(rows))..).unwrap_or(&[]);
         let covered = mask.get(start >> 3..).unwrap_or(&[]);
         models.row(bits, own.get_mut(..width).unwrap_or(&mut []), above(1), above(2), covered);
+    }
+}
+
+/// Codes `picture`, of half a byte a texel, like [`code`]: as if its texels were bytes.
+pub fn code_nibbles<B: Bits>(bits: &mut B, scratch: Scratch<'_>, picture: &mut Picture<'_>) {
+    let Scratch { contexts, recent, rows } = scratch;
+    contexts.fill(Probability::NEW);
+    code_mask(bits, contexts, picture);
+    let Picture { width_log2, texels, mask } = picture;
+    code_plane(bits, contexts, recent, rows, *width_log2, &mut Nibbles { texels, mask });
+}
+
+/// Codes `picture`, of RGB565, like [`code`], but as three planes one after the other: green, and what red and blue are more than half of it.
+pub fn code_direct<B: Bits>(bits: &mut B, scratch: Scratch<'_>, picture: &mut Picture<'_>) {
+    let Scratch { contexts, recent, rows } = scratch;
+    contexts.fill(Probability::NEW);
+    code_mask(bits, contexts, picture);
+    let Picture { width_log2, texels, mask } = picture;
+    for part in [Part::Green, Part::Red, Part::Blue] {
+        let texels = texels.as_chunks_mut().0;
+        code_plane(bits, contexts, recent, rows, *width_log2, &mut Direct { texels, mask, part });
+    }
+}
+
+/// Bytes that coding texels that are no bytes works in, for a picture 2^`width_log2` texels wide: three rows, and a bit each.
+#[must_use]
+pub const fn row_bytes(width_log2: u32) -> usize {
+    let width = 1usize.wrapping_shl(width_log2);
+    width.wrapping_mul(3).wrapping_add(width >> 3)
+}
+
+/// A picture whose texels are no bytes, or a part of each: told as bytes, row by row. `start`: texels before the row.
+trait Plane {
+    /// Rows of 2^`width_log2` texels.
+    fn height(&self, width_log2: u32) -> usize;
+    /// Makes `own` what there is to code of its row, and `known` what is known of it beforehand, a bit each.
+    fn load(&self, start: usize, own: &mut [u8], known: &mut [u8]);
+    /// Keeps what was coded.
+    fn store(&mut self, start: usize, own: &[u8]);
+}
+
+/// Codes a plane, in new contexts.
+fn code_plane<B: Bits>(
+    bits: &mut B,
+    contexts: &mut [Probability],
+    recent: &mut [Recent],
+    rows: &mut [u8],
+    width_log2: u32,
+    plane: &mut impl Plane,
+) {
+    let Some(mut models) = Models::new(contexts, recent) else { return };
+    let width = 1usize.wrapping_shl(width_log2);
+    let Some((own, rest)) = rows.split_at_mut_checked(width) else { return };
+    let Some((above, rest)) = rest.split_at_mut_checked(width) else { return };
+    let Some((second, known)) = rest.split_at_mut_checked(width) else { return };
+    let mut lines = [own, above, second];
+    for row in 0..plane.height(width_log2) {
+        let start = row.wrapping_shl(width_log2);
+        let [own, above, second] = &mut lines;
+        plane.load(start, own, known);
+        models.row(bits, own, if row > 0 { above } else { &[] }, if row > 1 { second } else { &[] }, known);
+        plane.store(start, own);
+        lines.rotate_right(1);
+    }
+}
+
+/// Texels of half a byte, two in each.
+struct Nibbles<'p> {
+    texels: &'p mut [u8],
+    mask: &'p [u8],
+}
+
+impl Plane for Nibbles<'_> {
+    fn height(&self, width_log2: u32) -> usize {
+        self.texels.len().wrapping_mul(2).wrapping_shr(width_log2)
+    }
+
+    fn load(&self, start: usize, own: &mut [u8], known: &mut [u8]) {
+        let texels = self.texels.get(start >> 1..).unwrap_or(&[]);
+        for ([low, high], two) in own.as_chunks_mut().0.iter_mut().zip(texels) {
+            (*low, *high) = (two & 15, two >> 4);
+        }
+        covered(self.mask, start, known);
+    }
+
+    fn store(&mut self, start: usize, own: &[u8]) {
+        let texels = self.texels.get_mut(start >> 1..).unwrap_or(&mut []);
+        for ([low, high], two) in own.as_chunks().0.iter().zip(texels) {
+            *two = low & 15 | high << 4;
+        }
+    }
+}
+
+/// Which of a row's texels belong to a chart; all without a mask.
+fn covered(mask: &[u8], start: usize, known: &mut [u8]) {
+    match mask.get(start >> 3..start.wrapping_shr(3).wrapping_add(known.len())) {
+        Some(row) => known.copy_from_slice(row),
+        None => known.fill(0xff),
+    }
+}
+
+/// A component of RGB565.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Part {
+    Green,
+    Red,
+    Blue,
+}
+
+/// One component of texels of RGB565.
+struct Direct<'p> {
+    texels: &'p mut [[u8; 2]],
+    mask: &'p [u8],
+    part: Part,
+}
+
+impl Part {
+    /// Where the component's lowest bit stands.
+    const fn shift(self) -> u32 {
+        match self {
+            Self::Green => 5,
+            Self::Red => 11,
+            Self::Blue => 0,
+        }
+    }
+
+    /// What stands for the component of `texel`: green as it is, the others by what they are more than half of it, both in a byte's upper bits.
+    const fn byte(self, texel: u16) -> u8 {
+        let green = texel >> 5 & 63;
+        let own = texel.wrapping_shr(self.shift());
+        match self {
+            Self::Green => (green << 2) as u8,
+            _ => (own.wrapping_sub(green >> 1).wrapping_add(16) << 3) as u8,
+        }
+    }
+
+    /// `texel` with the component that `byte` stands for.
+    const fn set(self, texel: u16, byte: u8) -> u16 {
+        let green = texel >> 5 & 63;
+        let (value, all) = match self {
+            Self::Green => (byte as u16 >> 2, 63u16),
+            _ => ((byte as u16 >> 3).wrapping_add(16).wrapping_add(green >> 1) & 31, 31),
+        };
+        texel & !all.wrapping_shl(self.shift()) | value.wrapping_shl(self.shift())
+    }
+}
+
+impl Plane for Direct<'_> {
+    fn height(&self, width_log2: u32) -> usize {
+        self.texels.len().wrapping_shr(width_log2)
+    }
+
+    fn load(&self, start: usize, own: &mut [u8], known: &mut [u8]) {
+        let texels = self.texels.get(start..).unwrap_or(&[]);
+        for (byte, texel) in own.iter_mut().zip(texels) {
+            *byte = self.part.byte(u16::from_le_bytes(*texel));
+        }
+        if self.part == Part::Green {
+            return covered(self.mask, start, known);
+        }
+        // Where what is known of a texel is as to the left, the rest most often is too.
+        let all = if self.part == Part::Red { 0x07e0 } else { 0xffe0 };
+        let mut left = None;
+        for (bits, texels) in known.iter_mut().zip(texels.chunks(8)) {
+            *bits = 0;
+            for (place, texel) in texels.iter().enumerate() {
+                let own = Some(u16::from_le_bytes(*texel) & all);
+                *bits |= u8::from(own == left) << (place & 7);
+                left = own;
+            }
+        }
+    }
+
+    fn store(&mut self, start: usize, own: &[u8]) {
+        let texels = self.texels.get_mut(start..).unwrap_or(&mut []);
+        for (byte, texel) in own.iter().zip(texels) {
+            *texel = self.part.set(u16::from_le_bytes(*texel), *byte).to_le_bytes();
+        }
     }
 }
 
@@ -127,6 +314,17 @@ struct Models<'m> {
     again: &'m mut [Probability],
     spelt: &'m mut [Probability],
     recent: &'m mut [Recent],
+}
+
+impl<'m> Models<'m> {
+    /// New ones, in `contexts` and `recent`; `None` where these are too few.
+    fn new(contexts: &'m mut [Probability], recent: &'m mut [Recent]) -> Option<Self> {
+        contexts.fill(Probability::NEW);
+        recent.fill([0; WAYS]);
+        let (same, rest) = contexts.split_at_mut_checked(SAME)?;
+        let (again, spelt) = rest.split_at_mut_checked(AGAIN)?;
+        Some(Self { same, again, spelt, recent })
+    }
 }
 
 impl Models<'_> {

@@ -1,138 +1,54 @@
-//! The player: new, seek, row. Keys are decoded into the caller's memory by `seek`, pixels are made by `row`.
+//! The player: new, seek, row. What is the same for all kinds of texels is in `playing`, the kinds are in `texels`; pixels go to the caller's row.
 
-use crate::coder::Decoder;
-use crate::draw::{Colours, Drawing, Probes, mean};
-use crate::format::{self, Limits, SPACE_CUBIC};
-use crate::key::Nothing;
-use crate::memory::{self, Workspace};
-use crate::record::{Place, SLICE_COST, Shape};
-use crate::row::Around;
-use crate::timeline::Moment;
+use crate::format::Limits;
+use crate::playing::{ByteOrder, Frame, Playing};
+use crate::texels::{Indexed8, Texels};
 use crate::work::{Probe, Work};
 use crate::{Bundle, MemoryError};
+use core::marker::PhantomData;
 
-/// A frame number.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Default)]
-pub struct Frame(pub u32);
-
-/// The order of the two bytes of a pixel in memory.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum ByteOrder {
-    /// As the machine writes a number.
-    #[default]
-    Native,
-    /// Most significant byte first, as most SPI panels want it.
-    BigEndian,
-    /// Least significant byte first.
-    LittleEndian,
-}
-
-/// The last key decoded, and how much of what led to it is known.
-#[derive(Clone, Copy, Debug)]
-struct Last {
-    key: usize,
-    /// Records since the last independent one; 0 for that one itself.
-    run: u32,
-    /// Keys decoded one after the other up to this one: as many of them as there are slots are held.
-    chain: usize,
-}
-
-/// A key that is being decoded.
-#[derive(Clone, Debug)]
-struct Coming<'a> {
-    run: u32,
-    place: Place,
-    bits: Decoder<'a>,
-    /// Slices of it, and how many of them are decoded.
-    slices: usize,
-    done: usize,
-    /// What there was to do in all, as [`Coming::left`] counts.
-    whole: u64,
-    /// Frames of the interval that have no share in it.
-    from: u32,
-    /// Shares that the seek that began it took beside its own.
-    lead: u32,
-}
-
-/// Shares of the next key that a jump takes beside its own: it decodes several keys anyway, and the first interval of a path may be short.
-const LEAD: u32 = 3;
-
-impl Coming<'_> {
-    /// What is left to do: bytes of the record, and [`SLICE_COST`] a slice.
-    fn left(&self) -> u64 {
-        let slices = self.slices.saturating_sub(self.done) as u64;
-        slices.saturating_mul(u64::from(SLICE_COST)).saturating_add(self.bits.left() as u64)
-    }
-}
-
-/// The keys that a moment needs.
-struct Needed {
-    first: usize,
-    last: usize,
-    /// Keys from the first to the last.
-    span: usize,
-    /// Keys from the start of the interval to the last.
-    ahead: usize,
-}
-
-/// Plays one bundle from memory that the caller owns.
+/// Plays one bundle from memory that the caller owns. `T` names the kinds of texels that it plays: a byte each unless it says otherwise.
+///
+/// Code for kinds that no player of a program names is not linked.
 #[derive(Debug)]
-pub struct Player<'a> {
-    bundle: &'a Bundle<'a>,
-    space: Workspace<'a>,
-    frame: Frame,
-    moment: Moment,
-    /// The last key that the frame needed.
-    last: Option<Last>,
-    /// The key after it, as far as it is decoded.
-    coming: Option<Coming<'a>>,
-    /// The row of cells that `space.rows` and `space.sheets` hold.
-    loaded: Option<usize>,
-    work: Work,
-    /// Pixels' bytes are in the other order than the machine's.
-    swapped: bool,
+pub struct Player<'a, T = Indexed8> {
+    playing: Playing<'a>,
+    texels: PhantomData<T>,
 }
 
 impl<'a> Player<'a> {
-    /// A player over `memory`, at frame 0.
+    /// A player over `memory`, at frame 0, of bundles with a byte a texel; [`Player::with_texels`] makes those of other kinds.
     ///
     /// # Errors
-    /// [`MemoryError::TooSmall`] where `memory` has fewer bytes than [`Bundle::memory_needed`].
+    /// [`MemoryError::TooSmall`] where `memory` has fewer bytes than [`Bundle::memory_needed`], [`MemoryError::Texels`] where the bundle's texels
+    /// are of another kind.
+    #[inline]
     pub fn new(bundle: &'a Bundle<'a>, memory: &'a mut [u8]) -> Result<Self, MemoryError> {
-        let (needed, given) = (bundle.memory_needed(), memory.len());
-        let too_small = MemoryError::TooSmall { needed, given };
-        if given < needed {
-            return Err(too_small);
-        }
-        let space = memory::workspace(bundle, memory).ok_or(too_small)?;
-        let moment = bundle.moment(0);
-        let mut player =
-            Self { bundle, space, frame: Frame(0), moment, last: None, coming: None, loaded: None, work: Work::default(), swapped: false };
-        player.set_byte_order(ByteOrder::Native);
-        player.seek(Frame(0));
-        Ok(player)
+        Self::with_texels(bundle, memory)
+    }
+}
+
+impl<'a, T: Texels> Player<'a, T> {
+    /// A player over `memory`, at frame 0, of bundles whose texels are of the kinds that `T` names.
+    ///
+    /// # Errors
+    /// Those of [`Player::new`]; [`MemoryError::Texels`] says what the bundle needs.
+    #[inline]
+    pub fn with_texels(bundle: &'a Bundle<'a>, memory: &'a mut [u8]) -> Result<Self, MemoryError> {
+        Ok(Self { playing: T::start(bundle, memory)?, texels: PhantomData })
     }
 
     /// The bundle that plays.
     #[must_use]
+    #[inline]
     pub fn bundle(&self) -> &'a Bundle<'a> {
-        self.bundle
+        self.playing.bundle()
     }
 
     /// Pixels come in this byte order from now on.
+    #[inline]
     pub fn set_byte_order(&mut self, order: ByteOrder) {
-        let (colours, _) = self.bundle.atlas().palette.as_chunks::<2>();
-        self.swapped = match order {
-            ByteOrder::Native => false,
-            ByteOrder::BigEndian => 1u16.to_be() != 1,
-            ByteOrder::LittleEndian => 1u16.to_le() != 1,
-        };
-        // A texel past the palette's end must not show what the caller's memory held.
-        self.space.palette.fill(0);
-        for (entry, bytes) in self.space.palette.iter_mut().zip(colours) {
-            let colour = u16::from_le_bytes(*bytes);
-            *entry = if self.swapped { colour.swap_bytes() } else { colour };
-        }
+        self.playing.set_byte_order(order);
     }
 
     /// Makes `frame` the current frame; past the end it wraps on a looping bundle, else the last frame stays.
@@ -141,84 +57,30 @@ impl<'a> Player<'a> {
     /// next is decoded ahead, as much of it as of the interval has passed, so that who plays on finds it there: in playback each of an
     /// interval's n frames decodes an n-th of a key. That is at most [`Limits::seek_keys`] keys in all: a seek that has already
     /// decoded as many leaves the coming key to the frames after it. A frame shown again decodes nothing.
+    #[inline]
     pub fn seek(&mut self, frame: Frame) {
-        let frames = self.bundle.frames();
-        let frame = if self.bundle.looping() { frame.0.checked_rem(frames).unwrap_or(0) } else { frame.0.min(frames.saturating_sub(1)) };
-        self.work = Work::default();
-        self.loaded = None;
-        self.frame = Frame(frame);
-        self.moment = self.bundle.moment(frame);
-        let Needed { first, last, span, .. } = self.needed();
-        // Either on from the last key, or from the independent key at or before the first one needed.
-        let on = self.last.map(|state| (state, self.distance(state.key, last))).filter(|(state, on)| {
-            let behind = self.bundle.looping() || state.key <= last;
-            behind && state.chain.saturating_add(*on) >= span
-        });
-        let back = (0..=first).rev().take_while(|&key| !self.bundle.key(key).independent).count();
-        let start = first.saturating_sub(back);
-        let anew = back.saturating_add(span);
-        let (mut key, count) = match on {
-            Some((state, on)) if on <= anew => (state.key.saturating_add(1), on),
-            _ => {
-                (self.last, self.coming) = (None, None);
-                (start, anew)
-            }
-        };
-        for _ in 0..count {
-            key = self.wrapped(key);
-            self.finish(key);
-            key = key.saturating_add(1);
-        }
-        self.ahead(last);
-    }
-
-    /// `key` on the timeline: past the last one of a looping path comes the first.
-    fn wrapped(&self, key: usize) -> usize {
-        key.checked_rem(self.bundle.key_count()).unwrap_or(0)
-    }
-
-    /// The keys that the current moment needs.
-    fn needed(&self) -> Needed {
-        let (back, ahead) = format::reach(self.bundle.path().time);
-        let (keys, from) = (self.bundle.key_count(), self.moment.interval);
-        let end = from.saturating_add(ahead);
-        if self.bundle.looping() {
-            let around = |key: usize| key.checked_rem(keys).unwrap_or(0);
-            let span = back.saturating_add(ahead).saturating_add(1);
-            // A loop of few keys comes by the same key more than once.
-            let first = around(from.saturating_add(keys.saturating_mul(back)).saturating_sub(back));
-            Needed { first, last: around(end), span, ahead }
-        } else {
-            let (first, last) = (from.saturating_sub(back), end.min(keys.saturating_sub(1)));
-            Needed { first, last, span: last.saturating_sub(first).saturating_add(1), ahead: last.saturating_sub(from) }
-        }
-    }
-
-    /// Keys from `from` on to `to`, around the loop where there is one.
-    fn distance(&self, from: usize, to: usize) -> usize {
-        let keys = self.bundle.key_count();
-        match to.checked_sub(from) {
-            Some(distance) => distance,
-            None => to.saturating_add(keys).saturating_sub(from),
-        }
+        self.playing.seek(frame);
     }
 
     /// The current frame.
     #[must_use]
+    #[inline]
     pub fn frame(&self) -> Frame {
-        self.frame
+        self.playing.frame()
     }
 
     /// Work done since the last `seek`.
     #[must_use]
+    #[inline]
     pub fn work(&self) -> Work {
-        self.work
+        self.playing.work()
     }
 
     /// The bounds on work that the bundle states.
     #[must_use]
+    #[inline]
     pub fn limits(&self) -> Limits {
-        self.bundle.limits()
+        self.bundle().limits()
     }
 
     /// Renders row `y` of the current frame as RGB565 into `out`: as many pixels as both `out` and the
@@ -228,170 +90,21 @@ impl<'a> Player<'a> {
     /// [`Limits::row_sheets`] sheets in a row of cells, at most that times the cell's width of either. The first row of a row of
     /// cells also interpolates the layers of two rows of nodes (where space is cubic of four, and works out what lies halfway between the
     /// inner two), or of one where the row of cells above was the last drawn: at most [`Limits::row_layers`] each. Never allocates, never waits.
+    #[inline]
     pub fn row(&mut self, y: u32, out: &mut [u16]) {
-        if let Some((mut drawing, work, paint)) = self.colours(y) {
-            drawing.row(y, out, work, &paint);
-        }
+        T::row(&mut self.playing, y, out);
     }
 
     /// Like [`Player::row`], with antialiased outlines: where a block of pixels shows more than one sheet, every pixel is the mean of four,
     /// a quarter of a pixel off its centre both ways. Such a block costs about four times as much as in `row`, all others the same.
+    #[inline]
     pub fn smooth_row(&mut self, y: u32, out: &mut [u16]) {
-        let swapped = self.swapped;
-        if let Some((mut drawing, work, paint)) = self.colours(y) {
-            let native = |colour: u16| if swapped { colour.swap_bytes() } else { colour };
-            drawing.smooth(y, out, work, &paint, |four| native(mean(four.map(native))));
-        }
-    }
-
-    /// What draws row `y` in colours, and counts; `None` below the screen.
-    #[inline(always)]
-    fn colours(&mut self, y: u32) -> Option<(Drawing<'_, 'a>, &mut Work, Colours<'_>)> {
-        if !self.ready(y) {
-            return None;
-        }
-        let texture = self.space.texture;
-        let (drawing, palette) = Drawing::new(self.bundle, &mut self.space);
-        Some((drawing, &mut self.work, Colours { texture, palette: palette.try_into().ok()? }))
+        T::smooth_row(&mut self.playing, y, out);
     }
 
     /// Like [`Player::row`], but says where each pixel comes from instead of its colour.
+    #[inline]
     pub fn probe_row(&mut self, y: u32, out: &mut [Probe]) {
-        if !self.ready(y) {
-            return;
-        }
-        let (mut drawing, _) = Drawing::new(self.bundle, &mut self.space);
-        drawing.row(y, out, &mut self.work, &Probes);
-    }
-
-    /// Loads the row of cells that row `y` is in; false below the screen.
-    fn ready(&mut self, y: u32) -> bool {
-        let row = (y >> self.bundle.grid().log2) as usize;
-        let inside = y < self.bundle.size().1;
-        if inside && self.loaded != Some(row) {
-            self.load(row);
-            self.space.plan.strip = None;
-        }
-        inside
-    }
-
-    /// Interpolates the nodes around a row of cells and looks up its sheets.
-    fn load(&mut self, row: usize) {
-        let grid = self.bundle.grid();
-        // How long ago the key at the start of the interval was decoded, and through it the others.
-        let age = self.needed().ahead;
-        let bundle = self.bundle;
-        let from = self.moment.interval as isize;
-        let Workspace { stream, rows, halfway, sheets, .. } = &mut self.space;
-        let at = |offset: isize| {
-            let inside = bundle.looping() || (0..bundle.key_count() as isize).contains(&from.wrapping_add(offset));
-            stream.key(age.checked_add_signed(offset.wrapping_neg())?).filter(|_| inside)
-        };
-        let Some((start, lists)) = stream.key(age).zip(stream.lists(age)) else { return };
-        let cubic_time = format::reach(bundle.path().time).0 == 1;
-        let around = Around {
-            before: at(-1).filter(|_| cubic_time),
-            from: start,
-            // A path of one key has nothing to move on to.
-            to: at(1).unwrap_or(start),
-            after: at(2).filter(|_| cubic_time),
-            key_bits: u32::from(bundle.path().key_bits),
-        };
-        let cubic = bundle.path().space == SPACE_CUBIC;
-        // Going down, the rows of nodes around the last row of cells are those around this one, but for the lowest.
-        let down = row > 0 && self.loaded == Some(row.wrapping_sub(1));
-        let known = match (down, cubic) {
-            (false, _) => 0,
-            (true, true) => 3,
-            (true, false) => 2,
-        };
-        match rows {
-            [_, top, bottom, _] if down && !cubic => core::mem::swap(top, bottom),
-            _ if down => rows.rotate_left(1),
-            _ => {}
-        }
-        for (place, nodes) in rows.iter_mut().enumerate().skip(known) {
-            // The second row of the four is the row of cells' upper edge; the outer two are for the middles alone.
-            if cubic || place == 1 || place == 2 {
-                let layers = nodes.fill(grid, row.wrapping_add(place).checked_sub(1), &around, &self.moment);
-                self.work.layers = self.work.layers.wrapping_add(layers);
-            }
-        }
-        let [before, top, bottom, after] = &*rows;
-        if cubic {
-            let layers = halfway.between(grid.node_columns(), [before, top, bottom, after]);
-            self.work.middles = self.work.middles.wrapping_add(layers);
-        }
-        sheets.fill(grid, row, lists, [top, halfway, bottom], cubic);
-        self.loaded = Some(row);
-    }
-
-    /// Takes up `key`, which follows the last one or is independent, where it was left, or begins it.
-    fn take_up(&mut self, key: usize) -> Coming<'a> {
-        let bundle = self.bundle;
-        self.coming.take().unwrap_or_else(|| {
-            let run = match self.last {
-                Some(last) if !bundle.key(key).independent => last.run.saturating_add(1),
-                _ => 0,
-            };
-            let place = bundle.place(key, run);
-            let slices = place.slices(bundle.grid());
-            let coming = Coming { run, place, bits: Decoder::new(bundle.record(key)), slices, done: 0, whole: 0, from: 0, lead: 0 };
-            let jumped = self.work.keys > 1 && self.work.keys < u32::from(bundle.limits().seek_keys);
-            Coming { whole: coming.left(), lead: if jumped { LEAD } else { 0 }, ..coming }
-        })
-    }
-
-    /// Decodes what is missing of `key`, which becomes the last one.
-    fn finish(&mut self, key: usize) {
-        let mut coming = self.take_up(key);
-        self.decode(&mut coming, 0);
-        self.space.stream.finish();
-        self.last = Some(Last { key, run: coming.run, chain: self.last.map_or(0, |last| last.chain).saturating_add(1) });
-    }
-
-    /// Decodes the key after `last` as far as it is due at the current moment.
-    fn ahead(&mut self, last: usize) {
-        let (next, Moment { passed, length, .. }) = (self.wrapped(last.saturating_add(1)), self.moment);
-        // A path that ends has no key after its last one; on a loop of one key the next is the same.
-        if next == last || (next == 0 && !self.bundle.looping()) {
-            return;
-        }
-        let mut coming = self.take_up(next);
-        let frame = passed.saturating_add(1).min(length);
-        if self.work.keys < u32::from(self.bundle.limits().seek_keys) {
-            // Every frame has the same share, to the nearest slice; the last one does all that is left.
-            let share = |frame: u32| frame.saturating_sub(coming.from).saturating_add(coming.lead);
-            let (frames, shares) = (share(frame), share(length));
-            let due = coming.whole.saturating_mul(u64::from(frames)).checked_div(u64::from(shares)).unwrap_or(0);
-            let slice = coming.whole.checked_div(coming.slices as u64).unwrap_or(0);
-            let rounded = if frames < shares { due.saturating_sub(slice >> 1) } else { due };
-            let left = coming.whole.saturating_sub(rounded);
-            self.decode(&mut coming, left);
-        } else {
-            coming.from = coming.from.max(frame);
-        }
-        self.coming = Some(coming);
-    }
-
-    /// Decodes slices of `coming` until no more than `left` is left to do.
-    fn decode(&mut self, coming: &mut Coming<'a>, left: u64) {
-        let bundle = self.bundle;
-        let shape = Shape {
-            grid: bundle.grid(),
-            labels: bundle.label_count(),
-            label: |label| bundle.label(label),
-            key_bits: u32::from(bundle.path().key_bits),
-            step_log2: u32::from(bundle.path().step_log2),
-            planes: bundle.planes(),
-        };
-        let bytes = coming.bits.left();
-        while coming.done < coming.slices && coming.left() > left {
-            self.space.stream.slice(&mut coming.bits, shape, coming.place, coming.done, &mut Nothing);
-            coming.done = coming.done.saturating_add(1);
-            self.work.slices = self.work.slices.wrapping_add(1);
-            self.work.keys = self.work.keys.wrapping_add(u32::from(coming.done == coming.slices));
-        }
-        self.work.record_bytes = self.work.record_bytes.wrapping_add(bytes.saturating_sub(coming.bits.left()) as u32);
+        self.playing.probe_row(y, out);
     }
 }

@@ -3,11 +3,11 @@
 
 use crate::canvas::{Canvas, to_image};
 use crate::files::write_png;
+use crate::picture::Player;
 use crate::render::{self, Plan};
 use crate::stage::Stage;
 use crate::window::DEFAULT_ROOM;
 use anyhow::{Context, Result};
-use cubist_core::Player;
 use std::path::Path;
 use std::time::Duration;
 

@@ -26,8 +26,9 @@ use anyhow::Result;
 use clap::Parser;
 use cli::{Cli, Command, Show, Usage};
 use cubist_baker::files::clean_up_when_interrupted;
-use cubist_core::{Bundle, Player};
+use cubist_core::Bundle;
 use input::Loaded;
+use picture::Player;
 use stage::Stage;
 use std::path::Path;
 use std::process::ExitCode;
@@ -86,6 +87,6 @@ fn with_player(path: Option<&Path>, then: impl FnOnce(&Loaded, &Bundle<'_>, Play
     let loaded = input::load(path)?;
     let bundle = input::parse(&loaded)?;
     let mut memory = input::memory(&bundle)?;
-    let player = Player::new(&bundle, &mut memory)?;
+    let player = Player::with_texels(&bundle, &mut memory)?;
     then(&loaded, &bundle, player)
 }

@@ -3,11 +3,11 @@
 
 use crate::input::{Loaded, print};
 use crate::overlay::grouped;
-use crate::picture::Picture;
+use crate::picture::{Picture, Player};
 use crate::progress::progress;
 use anyhow::Result;
 use cubist_core::format::{ATLAS, Section};
-use cubist_core::{Bundle, Frame, Player, Work};
+use cubist_core::{Bundle, Frame, Work};
 use serde_json::{Value, json};
 use std::time::Instant;
 

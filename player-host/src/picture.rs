@@ -1,8 +1,11 @@
 //! A picture as the device shows it: RGB565 pixels from the playback core, and the same pixels with 8 bits a channel.
 //! Filled from a `Player` row by row; read by `canvas` for the window and by `render` for files.
 
-use cubist_core::{Frame, Player, Work};
+use cubist_core::{AnyTexels, Frame, Work};
 use image::RgbImage;
+
+/// The desktop's player: of texels of every kind.
+pub type Player<'a> = cubist_core::Player<'a, AnyTexels>;
 
 /// Width x height RGB565 pixels, row 0 on top.
 pub struct Picture {

@@ -4,11 +4,10 @@
 use crate::cli::{Render, Usage};
 use crate::files::write_png;
 use crate::input::print;
-use crate::picture::Picture;
+use crate::picture::{Picture, Player};
 use crate::progress::progress;
 use anyhow::{Context, Result};
 use cubist_baker::files::{same, write_with};
-use cubist_core::Player;
 use image::codecs::gif::{GifEncoder, Repeat};
 use image::{Delay, DynamicImage};
 use std::ops::Range;

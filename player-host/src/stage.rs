@@ -5,9 +5,9 @@
 use crate::canvas::{Canvas, Colour};
 use crate::keys::Action;
 use crate::overlay::{Layout, Status};
-use crate::picture::Picture;
+use crate::picture::{Picture, Player};
 use crate::transport::{Ends, Transport};
-use cubist_core::{Player, Work};
+use cubist_core::Work;
 use std::collections::VecDeque;
 use std::time::Duration;
 
@@ -225,7 +225,7 @@ mod tests {
         let bytes = bundle();
         let parsed = Bundle::parse(&bytes).unwrap();
         let mut memory = vec![0; parsed.memory_needed()];
-        let player = Player::new(&parsed, &mut memory).unwrap();
+        let player = Player::with_texels(&parsed, &mut memory).unwrap();
         let stage = Stage::new(player, bytes.len(), parsed.memory_needed(), None, ZERO);
         let (width, height) = stage.natural_size((400, 300), 1, ZERO);
         test(stage, Canvas::new(width, height).unwrap());

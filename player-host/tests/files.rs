@@ -3,7 +3,9 @@
 
 mod common;
 
-use common::{SIZE, bundle};
+use common::{SIZE, bundle, bundle_of};
+use cubist_core::format::TexelKind;
+use cubist_core::{Direct565, Frame, Indexed4, Player, Texels};
 use image::AnimationDecoder;
 use std::path::Path;
 use std::process::{Command, Output};
@@ -35,6 +37,37 @@ fn names(dir: &Path) -> Vec<String> {
 
 fn pixels(path: &Path) -> image::RgbImage {
     image::open(path).unwrap().into_rgb8()
+}
+
+/// The colours of frame 4 of `bytes`, as a player of `T` draws it.
+fn colours<T: Texels>(bytes: &[u8]) -> Vec<[u8; 3]> {
+    let parsed = cubist_core::Bundle::parse(bytes).unwrap();
+    let mut memory = vec![0; parsed.memory_needed()];
+    let mut player = Player::<T>::with_texels(&parsed, &mut memory).unwrap();
+    player.seek(Frame(4));
+    let mut out = Vec::new();
+    for y in 0..SIZE.1 {
+        let mut row = vec![0u16; SIZE.0 as usize];
+        player.row(y, &mut row);
+        let widen = |value: u16, top: f64| (f64::from(value) * 255.0 / top).round() as u8;
+        out.extend(row.iter().map(|&pixel| [widen(pixel >> 11, 31.0), widen(pixel >> 5 & 63, 63.0), widen(pixel & 31, 31.0)]));
+    }
+    out
+}
+
+#[test]
+fn texels_of_every_kind_are_shown() {
+    let dir = tempfile::tempdir().unwrap();
+    let kinds = [(TexelKind::Indexed4, colours::<Indexed4> as fn(&[u8]) -> _), (TexelKind::Direct565, colours::<Direct565>)];
+    for (kind, colours) in kinds {
+        std::fs::write(dir.path().join("film.cubist"), bundle_of(kind)).unwrap();
+        done(&run(dir.path(), &["render", "film.cubist", "--out", "frames", "--frames", "4..=4"]));
+        let written = pixels(&dir.path().join("frames/frame-0004.png"));
+        let apart = |(a, b): (&image::Rgb<u8>, &[u8; 3])| a.0.iter().zip(b).any(|(a, b)| a.abs_diff(*b) > 1);
+        let wanted = colours(&bundle_of(kind));
+        assert!(written.pixels().len() == wanted.len() && !written.pixels().zip(&wanted).any(apart), "{kind:?}");
+        assert!(done(&run(dir.path(), &["measure", "film.cubist", "--json"])).contains("frames_per_second"));
+    }
 }
 
 #[test]

@@ -2,16 +2,28 @@
 //! Bundles come from `scenes`; pixels and probes go to the tests and to `figures`.
 
 use anyhow::Result;
-use cubist_core::{Bundle, Frame, Player, Probe};
+use cubist_core::{Bundle, Frame, Indexed8, Player, Probe, Texels};
 
-/// Calls `visit` with every frame number of `frames` and the player that stands at it.
+/// Calls `visit` with every frame number of `frames` and the player that stands at it, of a bundle with a byte a texel.
 ///
 /// # Errors
-/// The bundle does not parse.
-pub fn visit(bytes: &[u8], frames: impl IntoIterator<Item = u32>, mut visit: impl FnMut(u32, &mut Player<'_>)) -> Result<()> {
+/// The bundle does not parse, or has texels of another kind.
+pub fn visit(bytes: &[u8], frames: impl IntoIterator<Item = u32>, visit: impl FnMut(u32, &mut Player<'_>)) -> Result<()> {
+    visit_as::<Indexed8>(bytes, frames, visit)
+}
+
+/// Like [`visit`], with a player of texels that `T` names.
+///
+/// # Errors
+/// The bundle does not parse, or has texels of another kind.
+pub fn visit_as<T: Texels>(
+    bytes: &[u8],
+    frames: impl IntoIterator<Item = u32>,
+    mut visit: impl FnMut(u32, &mut Player<'_, T>),
+) -> Result<()> {
     let bundle = Bundle::parse(bytes)?;
     let mut memory = vec![0; bundle.memory_needed()];
-    let mut player = Player::new(&bundle, &mut memory)?;
+    let mut player = Player::<T>::with_texels(&bundle, &mut memory)?;
     for frame in frames {
         player.seek(Frame(frame));
         visit(frame, &mut player);
@@ -21,21 +33,21 @@ pub fn visit(bytes: &[u8], frames: impl IntoIterator<Item = u32>, mut visit: imp
 
 /// The current frame of `player`: RGB565, row by row.
 #[must_use]
-pub fn pixels(player: &mut Player<'_>) -> Vec<u16> {
+pub fn pixels<T: Texels>(player: &mut Player<'_, T>) -> Vec<u16> {
     whole(player, |player, y, out| player.row(y, out))
 }
 
 /// Where each pixel of the current frame of `player` comes from, row by row.
 #[must_use]
-pub fn probes(player: &mut Player<'_>) -> Vec<Probe> {
+pub fn probes<T: Texels>(player: &mut Player<'_, T>) -> Vec<Probe> {
     whole(player, |player, y, out| player.probe_row(y, out))
 }
 
 /// The current frame of `player`, row by row as `row` draws it.
 #[must_use]
-pub fn whole<T: Clone + Default>(player: &mut Player<'_>, row: impl Fn(&mut Player<'_>, u32, &mut [T])) -> Vec<T> {
+pub fn whole<P: Clone + Default, T: Texels>(player: &mut Player<'_, T>, row: impl Fn(&mut Player<'_, T>, u32, &mut [P])) -> Vec<P> {
     let (width, height) = player.bundle().size();
-    let mut picture = vec![T::default(); (width * height) as usize];
+    let mut picture = vec![P::default(); (width * height) as usize];
     for (y, out) in (0..).zip(picture.chunks_mut(width as usize)) {
         row(player, y, out);
     }

@@ -2,10 +2,11 @@
 //! Keys are decoded with the core's own description of the stream; everything after that (time, space, coverage, texel) is
 //! said again here, in the simplest way that can be checked by reading. Pictures go to the differential tests.
 
+use cubist_baker::encode::unpacked;
 use cubist_core::Bundle;
 use cubist_core::coder::{Decoder, Probability};
 use cubist_core::fixed::ONE;
-use cubist_core::format::{MASK, MASKED, SPACE_CUBIC, STRIP, TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
+use cubist_core::format::{MASKED, SPACE_CUBIC, STRIP, TIME_CUBIC, TIME_HOLD, TIME_LINEAR, TexelKind};
 use cubist_core::grid::Grid;
 use cubist_core::key::{Key, Nothing};
 use cubist_core::lists::{self, CHART, FIELD, Lists};
@@ -98,7 +99,9 @@ pub struct Reference<'a> {
     keys: Vec<Vec<Vec<Layer>>>,
     /// For every interval the cells' labels and their tests, front to back.
     lists: Vec<Vec<Vec<(u8, u16)>>>,
-    mask: &'a [u8],
+    /// The source image as a raw bundle has it.
+    texels: Vec<u8>,
+    mask: Vec<u8>,
 }
 
 impl<'a> Reference<'a> {
@@ -133,8 +136,8 @@ impl<'a> Reference<'a> {
             step_log2: u32::from(path.step_log2),
             planes: bundle.planes(),
         };
-        let mask = bundle.sections().find(|section| section.tag == MASK).map_or(&[][..], |section| section.bytes);
-        let mut reference = Self { bundle, grid, keys: Vec::new(), lists: Vec::new(), mask };
+        let (texels, mask) = unpacked(bundle);
+        let mut reference = Self { bundle, grid, keys: Vec::new(), lists: Vec::new(), texels, mask };
         let mut run = 0;
         for key in 0..bundle.key_count() {
             run = if bundle.key(key).independent { 0 } else { run + 1 };
@@ -316,9 +319,16 @@ impl<'a> Reference<'a> {
     }
 
     fn colour(&self, at: [f64; 2]) -> u16 {
-        let atlas = self.bundle.atlas();
-        let entry = 2 * usize::from(atlas.texels[self.texel(at)]);
-        u16::from_le_bytes([atlas.palette[entry], atlas.palette[entry + 1]])
+        let (atlas, index) = (self.bundle.atlas(), self.texel(at));
+        let two_bytes = |of: &[u8], at: usize| u16::from_le_bytes([of[2 * at], of[2 * at + 1]]);
+        match self.bundle.texel_kind() {
+            TexelKind::Indexed8 => two_bytes(atlas.palette, usize::from(self.texels[index])),
+            TexelKind::Indexed4 => {
+                let both = self.texels[index / 2];
+                two_bytes(atlas.palette, usize::from(if index.is_multiple_of(2) { both % 16 } else { both / 16 }))
+            }
+            TexelKind::Direct565 => two_bytes(&self.texels, index),
+        }
     }
 
     /// The index of the texel that holds a position.

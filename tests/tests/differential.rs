@@ -20,12 +20,13 @@
 //!
 //! Wherever label or colour differ, a position that was looked at must be within the bound of an edge between texels, or a field of zero.
 
+use cubist_baker::atlas::{self, Storage};
 use cubist_baker::bake::Settings;
 use cubist_baker::scene::builtin;
-use cubist_core::Bundle;
 use cubist_core::fixed::{MAX_FIELD, ONE, field_distance};
-use cubist_core::format::{SPACE_CUBIC, SPACE_LINEAR, TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
+use cubist_core::format::{SPACE_CUBIC, SPACE_LINEAR, TIME_CUBIC, TIME_HOLD, TIME_LINEAR, TexelKind};
 use cubist_core::timeline;
+use cubist_core::{AnyTexels, Bundle, Direct565, Indexed4, Indexed8, Texels};
 use cubist_tests::reference::{Pixel, Reference, Weights};
 use cubist_tests::{play, reference, scenes};
 
@@ -79,13 +80,13 @@ fn bounds(pixel: &Pixel, cell: u32, space: u8, width_log2: u32, weights: Weights
     ]
 }
 
-fn compare(bytes: &[u8], frames: impl IntoIterator<Item = u32>, weights: Weights, round: bool) -> Found {
+fn compare<T: Texels>(bytes: &[u8], frames: impl IntoIterator<Item = u32>, weights: Weights, round: bool) -> Found {
     let bundle = Bundle::parse(bytes).expect("the baker's bytes parse");
     let reference = Reference::new(&bundle);
     let (width, cell) = (bundle.size().0 as usize, 1 << bundle.path().cell_log2);
     let width_log2 = u32::from(bundle.atlas().width_log2);
     let mut found = Found::default();
-    play::visit(bytes, frames, |frame, player| {
+    play::visit_as::<T>(bytes, frames, |frame, player| {
         let colours = play::pixels(player);
         let probes = play::probes(player);
         for (index, (exact, (colour, probe))) in reference.frame(frame, weights).iter().zip(colours.into_iter().zip(probes)).enumerate() {
@@ -124,11 +125,16 @@ fn round_intervals(bytes: &[u8]) -> bool {
 
 /// Compares `frames` with the oracle, prints what was found (seen with `--nocapture`), and asserts the shares that may differ.
 fn check(name: &str, bytes: &[u8], frames: impl IntoIterator<Item = u32> + Clone) -> Found {
+    check_as::<Indexed8>(name, bytes, frames)
+}
+
+/// Like [`check`], by a player of texels that `T` names.
+fn check_as<T: Texels>(name: &str, bytes: &[u8], frames: impl IntoIterator<Item = u32> + Clone) -> Found {
     let round = round_intervals(bytes);
     let kinds =
         [("exact", Weights::Exact, if round { DIFFERING } else { DIFFERING_IN_TIME }), ("the player's", Weights::Player, DIFFERING)];
     let found = kinds.iter().take(if round { 1 } else { 2 }).map(|&(kind, weights, most)| {
-        let found = compare(bytes, frames.clone(), weights, round);
+        let found = compare::<T>(bytes, frames.clone(), weights, round);
         println!(
             "{name}, {kind} weights: {:.4} % differ, {} labels, {:.1e} texels apart (bound {:.1e}), {:.1} % ask fields",
             found.percent(),
@@ -284,6 +290,25 @@ fn single_frames_agree() {
         let (_, encoded) = scenes::bake(&scene, &Settings::default()).expect("it bakes");
         let found = check("pivot, one frame", &encoded.bundle, [0]);
         assert_eq!(found.labels, 0, "looping {looping}");
+    }
+}
+
+#[test]
+fn every_kind_of_texels_agrees_however_stored() {
+    for (name, max_side) in [("street", 512), ("terrain", 256)] {
+        for storage in [Storage::Raw, Storage::Packed] {
+            let bake = |texels| {
+                let source = atlas::Settings { max_side, texels, storage, ..atlas::Settings::default() };
+                bake(name, SIZE, 17, &Settings { atlas: source, ..Settings::default() })
+            };
+            let (name, frames) = (format!("{name}, {storage:?}"), [0, 5, 11, 16]);
+            let (four, direct) = (bake(TexelKind::Indexed4), bake(TexelKind::Direct565));
+            check_as::<Indexed4>(&format!("{name}, 4 bits"), &four, frames);
+            check_as::<Direct565>(&format!("{name}, RGB565"), &direct, frames);
+            check(&name, &bake(TexelKind::Indexed8), frames);
+            check_as::<AnyTexels>(&format!("{name}, any: 4 bits"), &four, frames);
+            check_as::<AnyTexels>(&format!("{name}, any: RGB565"), &direct, frames);
+        }
     }
 }
 

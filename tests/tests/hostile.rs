@@ -6,12 +6,12 @@ use cubist_baker::bake::Settings;
 use cubist_core::coder::{Bits, Probability};
 use cubist_core::format::{
     ATLAS, Atlas, Envelope, FIXED, KNOWN_FLAGS, KeyEntry, LABEL_BYTES, LABELS, LabelRecord, Limits, MASKED, PATH, Path, STRIP, Section,
-    VERSION,
+    TexelKind, VERSION,
 };
 use cubist_core::grid::Grid;
 use cubist_core::lists::{self, BOTH, CHART, FIELD, Lists, Sheets, SheetsRef};
 use cubist_core::plane::{CAMERA_BYTES, Camera, PLANE_BYTES, Plane, Vector};
-use cubist_core::{Bundle, BundleError, Frame, MemoryError, Player, checksum};
+use cubist_core::{AnyTexels, Bundle, BundleError, Frame, Indexed8, MemoryError, Player, Texels, checksum};
 use cubist_tests::random::{EDGES, Random};
 use cubist_tests::scenes;
 use proptest::prelude::*;
@@ -69,9 +69,16 @@ fn seal(bytes: &mut [u8]) {
 /// frames before each are passed through one by one.
 fn play(bytes: &[u8], fill: u8, walk: u32) -> Option<Vec<u16>> {
     let bundle = Bundle::parse(bytes).ok()?;
+    Some(match bundle.texel_kind() {
+        TexelKind::Indexed8 => play_as::<Indexed8>(&bundle, fill, walk),
+        _ => play_as::<AnyTexels>(&bundle, fill, walk),
+    })
+}
+
+fn play_as<T: Texels>(bundle: &Bundle<'_>, fill: u8, walk: u32) -> Vec<u16> {
     let (width, height) = bundle.size();
     let mut memory = vec![fill; bundle.memory_needed()];
-    let mut player = Player::new(&bundle, &mut memory).expect("the memory it asked for");
+    let mut player = Player::<T>::with_texels(bundle, &mut memory).expect("the memory it asked for");
     let mut pixels = Vec::new();
     for frame in [0, bundle.frames() / 2, bundle.frames() - 1] {
         for frame in frame.saturating_sub(walk)..=frame {
@@ -89,7 +96,7 @@ fn play(bytes: &[u8], fill: u8, walk: u32) -> Option<Vec<u16>> {
             pixels.extend(row);
         }
     }
-    Some(pixels)
+    pixels
 }
 
 /// Whether `bytes` parse; if so they play, the same from any memory, and whatever was shown before.
@@ -509,9 +516,44 @@ fn packed_pictures_of_any_size_ask_for_what_they_take() {
     let path = Path { width: 1, height: 1, limits, ..path };
     let bytes = with_section(packed(), PATH, &postcard::to_stdvec(&path).expect("a path serialises"));
     assert!(survives(&bytes));
-    for encoding in [2, 3, 0xff] {
+    for encoding in [6, 7, 8, 0xff] {
         let error = Bundle::parse(&with_atlas(&Atlas { encoding, ..atlas })).err();
         assert_eq!(error, Some(BundleError::Field { name: "ATLS encoding", found: encoding.into() }));
+    }
+}
+
+#[test]
+fn texels_of_other_kinds_play_whatever_their_bytes() {
+    let mut random = Random(11);
+    for (texels, storage) in [TexelKind::Indexed4, TexelKind::Direct565].into_iter().flat_map(|t| [(t, Storage::Raw), (t, Storage::Packed)])
+    {
+        let mut settings = Settings { cell: 8, key_interval: 2, ..Settings::default() };
+        (settings.atlas.max_side, settings.atlas.storage, settings.atlas.texels) = (64, storage, texels);
+        let bytes = scenes::bundle("street", [52, 39], 9, &settings).expect("a built-in scene bakes");
+        assert!(survives(&bytes), "{texels:?}, {storage:?}");
+        let section = Bundle::parse(&bytes).expect("sound").sections().find(|s| s.tag == ATLAS).expect("it is there").bytes;
+        let atlas: Atlas<'_> = postcard::from_bytes(section).expect("a sound image");
+        let with = |atlas: &Atlas<'_>| with_section(&bytes, ATLAS, &postcard::to_stdvec(atlas).expect("it serialises"));
+        for round in 0..200 {
+            let mut changed = section.to_vec();
+            let whole = 0..if round % 2 == 0 { 12 } else { section.len() };
+            mutate(&mut changed, whole, &mut random);
+            survives(&with_section(&bytes, ATLAS, &changed));
+            let cut = &atlas.texels[..random.below(atlas.texels.len())];
+            let played = survives(&with(&Atlas { texels: cut, ..atlas }));
+            assert_eq!(played, storage == Storage::Packed, "a raw picture is whole, a packed one any bytes");
+        }
+        for noise in [0, 0x0f, 0xf0, 0xff] {
+            assert!(survives(&with(&Atlas { texels: &vec![noise; atlas.texels.len()], ..atlas })));
+        }
+        let field = |palette: &[u8]| Bundle::parse(&with(&Atlas { palette, ..atlas })).err();
+        let refused = |bytes: usize| Some(BundleError::Field { name: "ATLS palette bytes", found: bytes as u32 });
+        let most = 2 * texels.colours();
+        assert_eq!(field(&vec![7; most + 2]), refused(most + 2));
+        assert_eq!(field(&[7]), refused(1));
+        assert_eq!(field(&[]), if most == 0 { None } else { refused(0) });
+        // Fewer colours than texels name: the others are black.
+        assert!(most == 0 || survives(&with(&Atlas { palette: &atlas.palette[..2], ..atlas })));
     }
 }
 

@@ -5,7 +5,7 @@ use cubist_baker::atlas::Storage;
 use cubist_baker::bake::{self, Flat, Settings};
 use cubist_baker::encode;
 use cubist_baker::inspect::Inspection;
-use cubist_core::format::{ATLAS, MASK};
+use cubist_core::format::{ATLAS, MASK, TexelKind};
 use cubist_core::{Bundle, Frame, MemoryError, Player};
 use cubist_tests::scenes;
 
@@ -16,8 +16,14 @@ const SCENES: [&str; 2] = ["street", "terrain"];
 
 /// A scene baked raw and packed.
 fn both(name: &str) -> (Flat, [Vec<u8>; 2]) {
+    both_of(name, TexelKind::Indexed8)
+}
+
+/// A scene baked raw and packed, with texels of `kind`.
+fn both_of(name: &str, kind: TexelKind) -> (Flat, [Vec<u8>; 2]) {
     let scene = scenes::reduced(name, SIZE, FRAMES).expect("a built-in scene");
-    let raw = Settings::default();
+    let mut raw = Settings::default();
+    raw.atlas.texels = kind;
     let flat = bake::flatten(&scene, &raw.atlas, &|_, _| {}).expect("it flattens");
     let bundles = [Storage::Raw, Storage::Packed].map(|storage| {
         let mut settings = raw;
@@ -25,6 +31,11 @@ fn both(name: &str) -> (Flat, [Vec<u8>; 2]) {
         bake::encode(&scene, &flat, &settings, &|_, _| {}).expect("it encodes").bundle
     });
     (flat, bundles)
+}
+
+/// The texels of a source image, a byte each.
+fn bytes_of(flat: &Flat) -> Vec<u8> {
+    flat.atlas.image.texels.iter().map(|&texel| texel as u8).collect()
 }
 
 /// All frames, plain and antialiased, from memory filled with `fill`.
@@ -53,7 +64,7 @@ fn packed_plays_the_pixels_of_raw() {
         assert!(pixels(&raw, 0) == pixels(&packed, 0xa5), "{name}: other pixels");
         let (raw_bundle, packed_bundle) = (Bundle::parse(&raw).expect("raw"), Bundle::parse(&packed).expect("packed"));
         assert!(encode::unpacked(&raw_bundle) == encode::unpacked(&packed_bundle), "{name}: other texels or another mask");
-        assert!(encode::unpacked(&packed_bundle).0 == flat.atlas.image.texels, "{name}: other texels");
+        assert!(encode::unpacked(&packed_bundle).0 == bytes_of(&flat), "{name}: other texels");
         let (before, after) = (Inspection::of(&raw).expect("raw"), Inspection::of(&packed).expect("packed"));
         let [was, is] = [&before, &after].map(|i| i.section_bytes(ATLAS) + i.section_bytes(MASK));
         println!("{name}: {} -> {} bytes, image and mask {was} -> {is}", raw.len(), packed.len());
@@ -74,9 +85,43 @@ fn the_document_says_how_to_unpack() {
         let bundle = Bundle::parse(&packed).expect("packed");
         let (width, height) = (flat.atlas.image.width as i32, flat.atlas.image.height as i32);
         let bytes = bundle.packed().expect("it is packed");
-        let (texels, mask) = Reader::new(bytes).picture(width, height);
-        assert!(texels == flat.atlas.image.texels, "{name}: other texels");
+        let mut reader = Reader::new(bytes);
+        let mask = reader.mask(width, height);
+        let texels = reader.texels(width, height, &mask);
+        assert!(texels == bytes_of(&flat), "{name}: other texels");
         assert!(mask == flat.atlas.image.covered, "{name}: another mask");
+    }
+}
+
+#[test]
+fn the_document_says_how_to_unpack_texels_that_are_no_bytes() {
+    for kind in [TexelKind::Indexed4, TexelKind::Direct565] {
+        let (flat, [_, packed]) = both_of("street", kind);
+        let image = &flat.atlas.image;
+        let (width, height) = (image.width as i32, image.height as i32);
+        let bundle = Bundle::parse(&packed).expect("packed");
+        let mut reader = Reader::new(bundle.packed().expect("it is packed"));
+        let mask = reader.mask(width, height);
+        assert!(mask == image.covered, "another mask");
+        if kind == TexelKind::Indexed4 {
+            let texels = reader.texels(width, height, &mask);
+            assert!(texels.iter().zip(&image.texels).all(|(&found, &wanted)| u16::from(found & 15) == wanted), "other texels");
+            continue;
+        }
+        let wanted: Vec<u16> = image.texels.iter().map(|&texel| encode::rgb565(image.palette[usize::from(texel)])).collect();
+        // Whether what is known of a texel is as to its left.
+        let as_left = |known: &[i32]| -> Vec<bool> {
+            (0..known.len()).map(|at| !at.is_multiple_of(width as usize) && known[at] == known[at - 1]).collect()
+        };
+        let green: Vec<i32> = reader.texels(width, height, &mask).into_iter().map(|byte| i32::from(byte) >> 2).collect();
+        let other = |bytes: Vec<u8>| -> Vec<i32> {
+            bytes.into_iter().zip(&green).map(|(byte, green)| ((i32::from(byte) >> 3) + 16 + (green >> 1)) & 31).collect()
+        };
+        let red = other(reader.texels(width, height, &as_left(&green)));
+        let both: Vec<i32> = red.iter().zip(&green).map(|(red, green)| red << 6 | green).collect();
+        let blue = other(reader.texels(width, height, &as_left(&both)));
+        let texels: Vec<u16> = both.iter().zip(blue).map(|(both, blue)| (both << 5 | blue) as u16).collect();
+        assert!(texels == wanted, "other texels");
     }
 }
 
@@ -122,11 +167,10 @@ impl<'b> Reader<'b> {
         bit
     }
 
-    /// Texels and mask of a picture with masked labels.
-    fn picture(&mut self, width: i32, height: i32) -> (Vec<u8>, Vec<bool>) {
-        let places = || (0..height).flat_map(move |y| (0..width).map(move |x| (x, y)));
+    /// The mask of a picture with masked labels.
+    fn mask(&mut self, width: i32, height: i32) -> Vec<bool> {
         let (mut contexts, mut mask) = (vec![NEW; 1024], Vec::new());
-        for (x, y) in places() {
+        for (x, y) in places(width, height) {
             let m = |i: i32, j: i32| {
                 let inside = (0..width).contains(&(x + i)) && y + j >= 0;
                 usize::from(inside && mask[((y + j) * width + x + i) as usize])
@@ -136,10 +180,15 @@ impl<'b> Reader<'b> {
             let second = 4 * m(-1, -2) + 2 * m(0, -2) + m(1, -2);
             mask.push(self.bit(&mut contexts[128 * second + 4 * first + own]));
         }
+        mask
+    }
+
+    /// The texels of a picture of bytes; `known`: the mask, or what stands for it.
+    fn texels(&mut self, width: i32, height: i32, known: &[bool]) -> Vec<u8> {
         let (mut same, mut again, mut spelt) = (vec![NEW; 2048], vec![NEW; 64], vec![NEW; 2048]);
         let mut recent = vec![vec![0u8; 8]; 256];
         let mut texels: Vec<u8> = Vec::new();
-        for (x, y) in places() {
+        for (x, y) in places(width, height) {
             let t = |i: i32, j: i32| {
                 ((0..width).contains(&(x + i)) && y + j >= 0).then(|| i32::from(texels[((y + j) * width + x + i) as usize]))
             };
@@ -147,7 +196,7 @@ impl<'b> Reader<'b> {
             let n = t(0, -1).unwrap_or(w);
             let (nw, ne, nn) = (t(-1, -1).unwrap_or(n), t(1, -1).unwrap_or(n), t(0, -2).unwrap_or(n));
             let ww = t(-2, 0).unwrap_or(w);
-            let covered = usize::from(mask[(y * width + x) as usize]);
+            let covered = usize::from(known[(y * width + x) as usize]);
             let equal = [w == n, n == nw, nw == w, n == ne, w == ww, n == nn];
             let agree: usize = equal.iter().enumerate().map(|(k, &equal)| usize::from(equal) << k).sum();
             let d = (w - nw).abs() + (n - nw).abs() + (n - ne).abs();
@@ -185,8 +234,13 @@ impl<'b> Reader<'b> {
             list.insert(0, texel);
             texels.push(texel);
         }
-        (texels, mask)
+        texels
     }
+}
+
+/// A picture's columns and rows, row by row.
+fn places(width: i32, height: i32) -> impl Iterator<Item = (i32, i32)> {
+    (0..height).flat_map(move |y| (0..width).map(move |x| (x, y)))
 }
 
 #[test]

@@ -13,6 +13,7 @@ use crate::chart::{self, Charting};
 use crate::gbuffer::{BACKGROUND, GBuffer, Hits};
 use crate::scene::{Background, Scene};
 use crate::shade::Shader;
+use cubist_core::format::TexelKind;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -50,10 +51,10 @@ pub enum AtlasError {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Storage {
-    /// A byte a texel: read from flash as it lies there, no memory.
+    /// As texels are: read from flash as they lie there, no memory.
     #[default]
     Raw,
-    /// Coded, for a smaller bundle: the player unpacks it into its memory, a byte a texel and an eighth for the mask.
+    /// Coded, for a smaller bundle: the player unpacks it into its memory, as much as raw and an eighth of a byte a texel for the mask.
     Packed,
 }
 
@@ -75,7 +76,9 @@ pub struct Settings {
     pub max_side: u32,
     /// Texels a pixel, at most, where a chart is seen closest.
     pub density: f64,
-    /// Palette entries, at most: 2..=256.
+    /// What a texel is.
+    pub texels: TexelKind,
+    /// Palette entries, at most: 2..=256. What the texels have no room for is not used; those without a palette have none.
     pub colours: usize,
     /// How the bundle holds it.
     pub storage: Storage,
@@ -83,7 +86,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { max_side: 512, density: 1.0, colours: 256, storage: Storage::Raw }
+        Self { max_side: 512, density: 1.0, texels: TexelKind::Indexed8, colours: 256, storage: Storage::Raw }
     }
 }
 
@@ -114,9 +117,11 @@ pub struct SourceImage {
     pub width: u32,
     /// Rows, a multiple of 4.
     pub height: u32,
-    /// Palette indices, row-major.
-    pub texels: Vec<u8>,
-    /// Colours, each one an RGB565 value widened by repeating its leading bits.
+    /// What a texel is in the bundle.
+    pub kind: TexelKind,
+    /// Indices of `palette`, row-major.
+    pub texels: Vec<u16>,
+    /// Colours, each one an RGB565 value widened by repeating its leading bits. Where the bundle's texels are colours themselves, all there are.
     pub palette: Vec<[u8; 3]>,
     /// Which texels show a surface rather than continue one.
     pub covered: Vec<bool>,
@@ -170,12 +175,16 @@ pub fn build(scene: &Scene, hits: &Hits, settings: &Settings, progress: &(dyn Fn
     let (gbuffer, seen) = locate(scene, hits, &charting, &layout, &label_of, &fixed);
     let filled = fill::fill(scene, &Shader::new(scene), hits, &charting, &layout, &seen);
     progress(3, 4);
-    let (texels, palette) = palette::reduce(&filled.colours, &seen.count, settings.colours.clamp(2, 256));
+    let kind = settings.texels;
+    let (texels, palette) = match kind.colours() {
+        0 => palette::direct(&filled.colours),
+        most => palette::reduce(&filled.colours, &seen.count, settings.colours.clamp(2, most)),
+    };
     let labels = outline(&charting, &layout, &label_of, labels, fixed, &filled.covered);
     let fill = filled.covered.iter().filter(|&&c| c).count() as f64 / filled.covered.len().max(1) as f64;
     let figures = Figures { charts: charting.charts.len(), labels: labels.len(), fill, scale: layout.scale, gutter: layout.gutter };
     progress(4, 4);
-    let image = SourceImage { width: layout.width, height: layout.height, texels, palette, covered: filled.covered, labels };
+    let image = SourceImage { width: layout.width, height: layout.height, kind, texels, palette, covered: filled.covered, labels };
     Ok(Atlas { image, gbuffer, figures })
 }
 

@@ -13,7 +13,7 @@ use cubist_core::coder::Probability;
 use cubist_core::fixed::{KEY_MAX, KEY_MIN};
 use cubist_core::format::{
     ATLAS, Atlas, Envelope, FIXED, INFO, KeyEntry, LABELS, LabelRecord, Limits, MAGIC, MASK, MASKED, PACKED, PATH, Path, RAW, STRIP,
-    Section, VERSION,
+    Section, TexelKind, VERSION,
 };
 use cubist_core::key::{Key, Source};
 use cubist_core::lists::{self, Lists};
@@ -100,11 +100,15 @@ pub fn bundle(content: &Content<'_>, settings: CodingSettings, header: Header<'_
         cameras: cameras.as_flattened(),
         records: &records,
     };
-    let palette: Vec<u8> = image.palette.iter().flat_map(|&colour| rgb565(colour).to_le_bytes()).collect();
-    let (encoding, texels) = match header.storage {
-        Storage::Raw => (RAW, image.texels.clone()),
+    let palette: Vec<u8> = match image.kind {
+        TexelKind::Direct565 => Vec::new(),
+        _ => image.palette.iter().flat_map(|&colour| rgb565(colour).to_le_bytes()).collect(),
+    };
+    let (packing, texels) = match header.storage {
+        Storage::Raw => (RAW, picture::texels(image)),
         Storage::Packed => (PACKED, packed(image)),
     };
+    let encoding = image.kind.encoding() | packing;
     let atlas =
         Atlas { width_log2: image.width.trailing_zeros() as u8, height: image.height as u16, encoding, palette: &palette, texels: &texels };
     let mask = picture::mask(image);

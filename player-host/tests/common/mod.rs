@@ -4,7 +4,7 @@
 
 use cubist_core::checksum;
 use cubist_core::format::{
-    ATLAS, Atlas, Envelope, KeyEntry, LABELS, LabelRecord, Limits, MAGIC, PATH, Path, SPACE_CUBIC, Section, TIME_LINEAR, VERSION,
+    ATLAS, Atlas, Envelope, KeyEntry, LABELS, LabelRecord, Limits, MAGIC, PATH, Path, SPACE_CUBIC, Section, TIME_LINEAR, TexelKind, VERSION,
 };
 
 /// Width, height, frames and frames per second of [`bundle`].
@@ -12,9 +12,14 @@ pub const SIZE: (u32, u32, u32, u32) = (96, 64, 12, 30);
 
 /// The bundle's bytes.
 pub fn bundle() -> Vec<u8> {
+    bundle_of(TexelKind::Indexed8)
+}
+
+/// The bytes of a bundle with texels of `kind`.
+pub fn bundle_of(kind: TexelKind) -> Vec<u8> {
     let mut lot = Lot(1);
-    let palette: Vec<u8> = (0..512).map(|_| lot.byte()).collect();
-    let texels: Vec<u8> = (0..64 * 64).map(|_| lot.byte()).collect();
+    let palette: Vec<u8> = (0..2 * kind.colours()).map(|_| lot.byte()).collect();
+    let texels: Vec<u8> = (0..kind.bytes(64 * 64)).map(|_| lot.byte()).collect();
     let records: Vec<u8> = (0..3 * 400).map(|_| lot.byte()).collect();
     let keys = [0, 5, 11].map(|frame| KeyEntry { frame, independent: frame == 0, end: 400 * frame.div_ceil(5).min(2) + 400 });
     let table: Vec<u8> = keys.iter().flat_map(|k| k.to_bytes()).collect();
@@ -39,7 +44,7 @@ pub fn bundle() -> Vec<u8> {
         records: &records,
     };
     let path = postcard::to_stdvec(&path).expect("a path is plain data");
-    let atlas = postcard::to_stdvec(&Atlas { width_log2: 6, height: 64, encoding: 0, palette: &palette, texels: &texels })
+    let atlas = postcard::to_stdvec(&Atlas { width_log2: 6, height: 64, encoding: kind.encoding(), palette: &palette, texels: &texels })
         .expect("an image is plain data");
     let sections = [(PATH, &path), (ATLAS, &atlas), (LABELS, &labels)].map(|(tag, bytes)| Section { tag, required: true, bytes });
     let envelope = Envelope { magic: MAGIC, version: VERSION, sections: sections.into_iter().collect() };
