@@ -7,6 +7,7 @@ pub mod atlas;
 pub mod bake;
 pub mod camera;
 pub mod chart;
+pub mod choose;
 pub mod encode;
 pub mod fields;
 pub mod files;

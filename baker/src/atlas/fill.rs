@@ -110,7 +110,7 @@ impl Patch<'_> {
     /// World units a texel covers; 0 for a texture copied texel by texel.
     fn texel_size(&self) -> f64 {
         match self.charting.charts[self.chart].projection {
-            Projection::Plane(_) => 1.0 / (self.place.step[0] * self.place.step[1]).sqrt(),
+            Projection::Plane(_) | Projection::Point(..) => 1.0 / (self.place.step[0] * self.place.step[1]).sqrt(),
             Projection::Texture => 0.0,
         }
     }
@@ -166,14 +166,16 @@ impl Patch<'_> {
         let Place { rect, origin, step } = self.place;
         let fine = self.fine();
         let corners = self.charting.corners[face as usize];
-        let [p, q, r] = corners.map(|c| [0, 1].map(|k| (origin[k] + c[k] * step[k] - f64::from(rect[k])) * f64::from(fine)));
+        let [p, q, r] = corners.map(|c| [0, 1].map(|k| (origin[k] + c[k] / c[3] * step[k] - f64::from(rect[k])) * f64::from(fine)));
         let det = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
         if det.abs() < 1e-12 {
             return;
         }
         let surface = self.charting.faces.list[face as usize].surface;
         let cosine = match self.charting.charts[self.chart].projection {
-            Projection::Plane(axes) => self.charting.faces.list[face as usize].normal.dot(axes[2]).abs().max(0.2),
+            Projection::Plane(axes) | Projection::Point(_, axes, _) => {
+                self.charting.faces.list[face as usize].normal.dot(axes[2]).abs().max(0.2)
+            }
             Projection::Texture => 1.0,
         };
         let reach = self.texel_size() * (3.0 + 3.0 * (1.0 / (cosine * cosine) - 1.0).sqrt());
@@ -187,6 +189,9 @@ impl Patch<'_> {
                 let at = [f64::from(i) + 0.5 - p[0], f64::from(j) + 0.5 - p[1]];
                 let b = (at[0] * (r[1] - p[1]) - at[1] * (r[0] - p[0])) / det;
                 let c = ((q[0] - p[0]) * at[1] - (q[1] - p[1]) * at[0]) / det;
+                // From the picture's shares to the face's: the same but where the view is from a point.
+                let [a, b, c] = [(1.0 - b - c) / corners[0][3], b / corners[1][3], c / corners[2][3]];
+                let [b, c] = [b / (a + b + c), c / (a + b + c)];
                 if b.min(c).min(1.0 - b - c) < -1e-9 || is_hole(self.scene, surface / 2, [b, c]) {
                     continue;
                 }
