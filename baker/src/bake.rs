@@ -228,7 +228,9 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let fields = fields.settled(gbuffer, &grid, &sheets, &layers);
     let fields = polish::polish(fields, gbuffer, &grid, &sheets, &layers);
     progress("coding keys", 0.8);
-    let header = encode::Header { storage: settings.atlas.storage, fps: scene.playback.fps, info: &scene.name };
+    let choice = settings.atlas.charts;
+    let info = if choice.tried().next().is_some() { format!("{}; {}", scene.name, choice.reason()) } else { scene.name.clone() };
+    let header = encode::Header { storage: settings.atlas.storage, fps: scene.playback.fps, info: &info };
     let (planes, cameras) = planes::records(&charts, &layers.by_label(image.labels.len()), &lenses, &grid);
     let content =
         Content { grid: &grid, image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields, planes: &planes, cameras: &cameras };

@@ -3,6 +3,7 @@
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use cubist_baker::atlas;
+use cubist_baker::chart::Family;
 use cubist_baker::{Goal, Options, TruthFrames};
 use cubist_core::format::{SPACE_CUBIC, SPACE_LINEAR, TIME_CUBIC, TIME_HOLD, TIME_LINEAR, TexelKind};
 use std::path::PathBuf;
@@ -110,6 +111,12 @@ pub struct Bake {
     /// an RP2040, drawing can then be faster. With --budget the search may pack what does not fit raw, unless this is given; --ram counts it.
     #[arg(long, value_enum, value_name = "KIND")]
     pub storage: Option<Storage>,
+    /// How the surface is cut into charts and flattened [default: auto].
+    ///
+    /// Auto tries all on the scene at half the size, and keeps what costs least in bytes and quality; the report says why. A scene that brings a
+    /// flattening of its own, as built-in ones do, keeps it.
+    #[arg(long, value_enum, value_name = "KIND")]
+    pub charts: Option<Charts>,
     /// Every Nth key needs no earlier one: a seek decodes at most N + 1 keys.
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=1000))]
     pub independent_every: u16,
@@ -198,6 +205,19 @@ pub enum Texels {
     Direct,
 }
 
+/// How the surface is cut into charts and flattened.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Charts {
+    /// What costs least.
+    Auto,
+    /// Straight on, along parallel rays: for rooms, buildings, machines.
+    Planes,
+    /// As the camera sees it: for curved bodies and land.
+    Sight,
+    /// As the scene itself has it; planes, if it has none.
+    Own,
+}
+
 /// What replaces the scene's playback.
 #[derive(Args, Clone, Copy, Debug)]
 pub struct Playback {
@@ -268,6 +288,12 @@ impl Bake {
             Time::Linear => TIME_LINEAR,
             Time::Cubic => TIME_CUBIC,
         };
+        let charts = |charts| match charts {
+            Charts::Auto => None,
+            Charts::Planes => Some(Family::Planes),
+            Charts::Sight => Some(Family::Sight),
+            Charts::Own => Some(Family::Own),
+        };
         let storage = |storage| if storage == Storage::Raw { atlas::Storage::Raw } else { atlas::Storage::Packed };
         let texels = match self.texels {
             Texels::Eight => TexelKind::Indexed8,
@@ -289,6 +315,7 @@ impl Bake {
                 ..atlas::Settings::default()
             },
             storage: self.storage.map(storage),
+            charts: self.charts.and_then(charts).map(Into::into),
             independent_every: self.independent_every.into(),
             goal,
             truth: self.truth,

@@ -3,6 +3,8 @@
 
 use crate::atlas::{self, Storage};
 use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings};
+use crate::chart::{self, Choice, Family};
+use crate::choose;
 use crate::inspect::Inspection;
 use crate::report::{Origin, Report, Seconds};
 use crate::scene::Scene;
@@ -55,6 +57,8 @@ pub struct Options {
     pub source: atlas::Settings,
     /// How the bundle holds it, in place of `source.storage`; `None`: as that says, but a search for a budget may pack it.
     pub storage: Option<Storage>,
+    /// How the surface is cut and flattened, in place of `source.charts`; `None`: the baker tries.
+    pub charts: Option<Choice>,
     /// Every this many keys one that needs no earlier one.
     pub independent_every: usize,
     /// What to reach.
@@ -75,6 +79,7 @@ impl Default for Options {
             even_keys: false,
             source: atlas::Settings::default(),
             storage: None,
+            charts: None,
             independent_every: Settings::default().coding.independent_every,
             goal: Goal::AsSet,
             truth: TruthFrames::Most(16),
@@ -100,7 +105,11 @@ impl Options {
     /// The source image, stored as asked for.
     #[must_use]
     pub fn source(&self) -> atlas::Settings {
-        atlas::Settings { storage: self.storage.unwrap_or(self.source.storage), ..self.source }
+        atlas::Settings {
+            storage: self.storage.unwrap_or(self.source.storage),
+            charts: self.charts.unwrap_or(self.source.charts),
+            ..self.source
+        }
     }
 
     /// What else helps where a search finds nothing: to leave to it what is given; nothing where nothing is. `cells`: the search would try other
@@ -154,6 +163,9 @@ pub fn bake_scene(scene: &Scene, options: &Options, progress: Progress<'_>) -> R
 /// The same.
 pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<Baked, BakeError> {
     let start = Instant::now();
+    let choice = choice(scene, options, progress)?;
+    let options = &Options { charts: Some(choice), ..*options };
+    let choice_seconds = start.elapsed().as_secs_f64();
     let settings = options.settings(scene.playback.width);
     let Chosen { flat, encoded, settings, search_seconds, warnings } = match options.goal {
         Goal::AsSet => {
@@ -190,12 +202,21 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
         rays: flat.ray_seconds,
         encode: encoded.seconds,
         verify: verify_start.elapsed().as_secs_f64(),
-        search: search_seconds,
+        search: choice_seconds + search_seconds,
     };
     let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings };
     let mut report = Report::new(&origin, &inspection, quality, truth, work, seconds);
     report.warnings.extend(warnings);
     Ok(Baked { bundle: encoded.bundle, report, flat })
+}
+
+/// How to cut the surface: as asked for, as the scene brings it, or as trials show.
+fn choice(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<Choice, BakeError> {
+    match options.charts {
+        Some(choice) => Ok(choice),
+        None if chart::brings_own(scene) => Ok(Family::Own.into()),
+        None => choose::charts(scene, &options.settings(scene.playback.width), progress),
+    }
 }
 
 /// Refuses a path that shows nothing but background.

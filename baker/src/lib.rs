@@ -8,6 +8,7 @@ pub mod bake;
 pub mod camera;
 pub mod causes;
 pub mod chart;
+pub mod choose;
 pub mod encode;
 pub mod fields;
 pub mod files;

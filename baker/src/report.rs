@@ -4,6 +4,7 @@
 use crate::atlas::Storage;
 use crate::bake::{Encoded, Flat, Settings};
 use crate::causes::Causes;
+use crate::chart::{Choice, Family, Trial};
 use crate::inspect::Inspection;
 use crate::scene::Scene;
 use crate::verify::{Quality, TruthQuality, Work};
@@ -78,7 +79,7 @@ pub struct Memory {
 }
 
 /// The source image.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Source {
     /// Texels a row.
     pub width: u32,
@@ -94,6 +95,10 @@ pub struct Source {
     pub stored_bytes: usize,
     /// Bytes of texels and mask, raw.
     pub raw_bytes: usize,
+    /// How the surface was cut and flattened.
+    pub candidate: Family,
+    /// What was tried before, and what came of it; empty where nothing was.
+    pub trials: Vec<Trial>,
     /// Connected regions.
     pub charts: usize,
     /// Labels, the background included.
@@ -106,6 +111,13 @@ pub struct Source {
     pub scale: f64,
     /// Texels between charts.
     pub gutter: u32,
+}
+
+/// Why the surface was cut as it is, in words.
+fn reason(image: &Source) -> String {
+    let mut choice = Choice::from(image.candidate);
+    choice.trials.iter_mut().zip(&image.trials).for_each(|(to, from)| *to = Some(*from));
+    choice.reason()
 }
 
 /// The report; its keys keep their names and meaning.
@@ -191,6 +203,8 @@ impl Report {
                 storage: settings.atlas.storage,
                 stored_bytes: inspection.image.stored_bytes,
                 raw_bytes: inspection.image.raw_bytes,
+                candidate: settings.atlas.charts.family,
+                trials: settings.atlas.charts.tried().copied().collect(),
                 charts: figures.charts,
                 labels: figures.labels,
                 fill: figures.fill,
@@ -319,6 +333,7 @@ pub fn table(report: &Report) -> Vec<(String, String)> {
         ),
     );
     row("labels, mask", format!("{} bytes: {} labels for {} charts", grouped(bytes.labels + bytes.mask), image.labels, image.charts));
+    row("", reason(image));
     row("keys", format!("{} bytes: {:.1} a frame", grouped(bytes.keys), bytes.keys_per_frame));
     row("bundle", format!("{} bytes: {:.1} a frame", grouped(bytes.bundle), bytes.per_frame));
     row(

@@ -111,7 +111,7 @@ impl Patch<'_> {
     /// World units a texel covers; 0 for a texture copied texel by texel.
     fn texel_size(&self) -> f64 {
         match self.charting.charts[self.chart].projection {
-            Projection::Plane(_) => self.place.texel(),
+            Projection::Plane(_) | Projection::Point(..) => self.place.texel(),
             Projection::Texture => 0.0,
         }
     }
@@ -168,15 +168,18 @@ impl Patch<'_> {
         let fine = self.fine();
         let surface = self.charting.faces.list[face as usize].surface;
         let cosine = match self.charting.charts[self.chart].projection {
-            Projection::Plane(axes) => self.charting.faces.list[face as usize].normal.dot(axes[2]).abs().max(0.2),
+            Projection::Plane(axes) | Projection::Point(_, axes, _) => {
+                self.charting.faces.list[face as usize].normal.dot(axes[2]).abs().max(0.2)
+            }
             Projection::Texture => 1.0,
         };
         let reach = self.texel_size() * (3.0 + 3.0 * (1.0 / (cosine * cosine) - 1.0).sqrt());
-        let corners = self.charting.corners[face as usize].map(|c| {
+        let corners = self.charting.outline(face as usize).map(|c| {
             let at = self.place.at(c);
             [0, 1].map(|k| (at[k] - f64::from(rect[k])) * f64::from(fine))
         });
-        each_sample(corners, [0, 1].map(|k| (rect[k + 2] - rect[k]) * fine), EDGE, |i, j, [b, c]| {
+        each_sample(corners, [0, 1].map(|k| (rect[k + 2] - rect[k]) * fine), EDGE, |i, j, shares| {
+            let [b, c] = self.charting.weights(face as usize, shares);
             if is_hole(self.scene, surface / 2, [b, c]) {
                 return;
             }

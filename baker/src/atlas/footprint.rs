@@ -81,10 +81,10 @@ impl<'a> Footprints<'a> {
             let mut mask = Mask::new(size[0], size[1]);
             for &face in faces {
                 let surface = self.charting.faces.list[face as usize].surface;
-                let corners = self.charting.corners[face as usize].map(|c| place.at(c).map(|v| v * f64::from(fine)));
-                each_sample(corners, size.map(|v| v * fine), EDGE, |x, y, bary| {
+                let corners = self.charting.outline(face as usize).map(|c| place.at(c).map(|v| v * f64::from(fine)));
+                each_sample(corners, size.map(|v| v * fine), EDGE, |x, y, shares| {
                     let (x, y) = (x / fine, y / fine);
-                    if !mask.has(x, y) && !is_hole(self.scene, surface / 2, bary) {
+                    if !mask.has(x, y) && !is_hole(self.scene, surface / 2, self.charting.weights(face as usize, shares)) {
                         mask.set(x, y);
                     }
                 });

@@ -9,7 +9,7 @@ mod palette;
 mod place;
 mod strip;
 
-use crate::chart::{self, Charting};
+use crate::chart::{self, Charting, Choice, Family};
 use crate::gbuffer::{BACKGROUND, GBuffer, Hits};
 use crate::scene::{Background, Scene};
 use crate::shade::Shader;
@@ -82,11 +82,13 @@ pub struct Settings {
     pub colours: usize,
     /// How the bundle holds it.
     pub storage: Storage,
+    /// How the surface is cut and flattened.
+    pub charts: Choice,
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { max_side: 512, density: 1.0, texels: TexelKind::Indexed8, colours: 256, storage: Storage::Raw }
+        Self { max_side: 512, density: 1.0, texels: TexelKind::Indexed8, colours: 256, storage: Storage::Raw, charts: Family::Own.into() }
     }
 }
 
@@ -161,7 +163,7 @@ pub fn build(scene: &Scene, hits: &Hits, settings: &Settings, progress: &(dyn Fn
         return Err(AtlasError::Side(settings.max_side));
     }
     progress(0, 4);
-    let charting = chart::build(scene, hits, settings.density.clamp(0.05, 8.0), settings.max_side);
+    let charting = chart::build(scene, hits, settings.charts.family, settings.density.clamp(0.05, 8.0), settings.max_side);
     progress(1, 4);
     let (label_of, labels) = chart::assign(hits, &charting, WANTED_LABELS - 1);
     if labels + 1 > MAX_LABELS {

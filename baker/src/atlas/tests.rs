@@ -185,7 +185,7 @@ fn planes_are_charts_of_their_own_and_a_smooth_hill_is_one() {
 fn texels_lie_in_their_own_charts_footprint() {
     for scene in [cube(), hill(), crossing()] {
         let hits = hits(&scene);
-        let charting = chart::build(&scene, &hits, 1.0, 512);
+        let charting = chart::build(&scene, &hits, chart::Family::Own, 1.0, 512);
         let footprints = footprint::Footprints::new(&scene, &hits, &charting);
         for side in [64, 512] {
             let layout = pack::pack(&footprints, [4, 4], side).expect("a layout");

@@ -16,7 +16,7 @@ const FITTING: f64 = 0.9;
 
 /// Joins clusters, smallest first, and renumbers what is left; `samples` is the number of pixels of all frames.
 pub(crate) fn absorb(faces: &Faces, links: &Links, clusters: &mut Clusters, samples: usize) {
-    let count = clusters.normals.len();
+    let count = clusters.views.len();
     let mut members: Vec<Vec<u32>> = vec![Vec::new(); count];
     let mut hits = vec![0u64; count];
     for (f, &c) in clusters.of.iter().enumerate() {
@@ -41,8 +41,8 @@ pub(crate) fn absorb(faces: &Faces, links: &Links, clusters: &mut Clusters, samp
             }
         }
         let fitting = |plane: u32| {
-            let normal = clusters.normals[plane as usize];
-            let fits = |f: &&u32| faces.list[**f as usize].normal.dot(normal) > GRAZING;
+            let view = clusters.views[plane as usize];
+            let fits = |f: &&u32| view.cosine(&faces.list[**f as usize]).is_some_and(|c| c > GRAZING);
             let fit: u64 = members[c as usize].iter().filter(fits).map(|&f| u64::from(faces.list[f as usize].hits)).sum();
             fit as f64 >= FITTING * hits[c as usize] as f64
         };
@@ -58,14 +58,14 @@ pub(crate) fn absorb(faces: &Faces, links: &Links, clusters: &mut Clusters, samp
         }
     }
     let mut number = vec![NONE; count];
-    let mut normals = Vec::new();
+    let mut views = Vec::new();
     for of in &mut clusters.of {
         let r = root(&mut parent, *of) as usize;
         if number[r] == NONE {
-            number[r] = normals.len() as u32;
-            normals.push(clusters.normals[r]);
+            number[r] = views.len() as u32;
+            views.push(clusters.views[r]);
         }
         *of = number[r];
     }
-    clusters.normals = normals;
+    clusters.views = views;
 }

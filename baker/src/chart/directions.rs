@@ -1,9 +1,8 @@
-//! Directions: along which a chart may be projected, and what each costs the faces it shows.
-//! Faces come from `observe`; costs go to `merge`.
+//! Directions: along which a chart may be projected so that its faces are seen straight on, and what each costs them.
+//! Faces come from `observe`; `family` hands directions and costs on to `merge`.
 
 use super::observe::Face;
 use glam::DVec3;
-use rayon::prelude::*;
 
 /// Directions taken from the seen normals.
 const MEANS: usize = 28;
@@ -12,13 +11,13 @@ const ROUNDS: usize = 8;
 /// Directions closer than this, as a cosine, are one: 10 degrees.
 const SAME: f64 = 0.985;
 /// What a pixel costs whose face is shown an octave too coarse; the cost grows with the square of octaves.
-const OCTAVE: f64 = 0.004;
+pub(super) const OCTAVE: f64 = 0.004;
 /// Octaves that a face loses for each octave that its projection is narrower: half of it in density, half of it in shape.
 const LOSS: f64 = 0.75;
 /// The least cosine at which a projection shows a face.
 const GRAZING: f64 = 0.2;
 /// What a pixel costs that is not shown.
-const HIDDEN: f64 = 0.05;
+pub(super) const HIDDEN: f64 = 0.05;
 
 /// What a pixel costs whose face is projected at an angle of cosine `cosine`.
 pub(super) fn cost(cosine: f64) -> f64 {
@@ -31,7 +30,7 @@ pub(super) fn cost(cosine: f64) -> f64 {
 
 /// The directions to choose from: 26 even ones, those among them replaced that the seen normals come close to.
 pub(super) fn candidates(faces: &[Face]) -> Vec<DVec3> {
-    let means = means(faces);
+    let means = means(faces, |f| f.normal);
     let steps = || [-1.0, 0.0, 1.0].into_iter();
     let even = steps().flat_map(|x| steps().flat_map(move |y| steps().map(move |z| DVec3::new(x, y, z))));
     let mut out: Vec<DVec3> = even.filter_map(DVec3::try_normalize).filter(|d| means.iter().all(|m| m.dot(*d) < SAME)).collect();
@@ -43,9 +42,9 @@ pub(super) fn candidates(faces: &[Face]) -> Vec<DVec3> {
     out
 }
 
-/// The normals that stand for all: far from each other first, then moved to the middle of those nearest to them.
-fn means(faces: &[Face]) -> Vec<DVec3> {
-    let weighted: Vec<(DVec3, f64)> = faces.iter().filter(|f| f.normal != DVec3::ZERO).map(|f| (f.normal, f64::from(f.hits))).collect();
+/// The unit vectors that stand for those of all faces: far from each other first, then moved to the middle of those nearest to them.
+pub(super) fn means(faces: &[Face], of: impl Fn(&Face) -> DVec3) -> Vec<DVec3> {
+    let weighted: Vec<(DVec3, f64)> = faces.iter().filter(|f| f.normal != DVec3::ZERO).map(|f| (of(f), f64::from(f.hits))).collect();
     let mut means: Vec<DVec3> = Vec::new();
     let mut near = vec![-2.0f64; weighted.len()];
     for _ in 0..MEANS {
@@ -69,19 +68,4 @@ fn means(faces: &[Face]) -> Vec<DVec3> {
         }
     }
     means
-}
-
-/// What each direction costs each group of faces; `groups` are indices into `faces`.
-pub(super) fn costs(faces: &[Face], groups: &[Vec<u32>], directions: &[DVec3]) -> Vec<Vec<f64>> {
-    let of = |group: &Vec<u32>| {
-        let mut sums = vec![0.0; directions.len()];
-        for &f in group {
-            let face = &faces[f as usize];
-            for (sum, d) in sums.iter_mut().zip(directions) {
-                *sum += f64::from(face.hits) * cost(face.normal.dot(*d));
-            }
-        }
-        sums
-    };
-    groups.par_iter().map(of).collect()
 }

@@ -154,7 +154,9 @@ fn examine<'t>(
     state: &mut [u8],
     touched: impl Fn(u32) -> &'t [Touch],
 ) -> Vec<Vec<u32>> {
-    let Projection::Plane([_, _, normal]) = charting.charts[chart as usize].projection else { return Vec::new() };
+    let (Projection::Plane([_, _, normal]) | Projection::Point(_, [_, _, normal], _)) = charting.charts[chart as usize].projection else {
+        return Vec::new();
+    };
     if faces.iter().all(|&f| touched(f).is_empty()) {
         return Vec::new();
     }

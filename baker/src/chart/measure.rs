@@ -88,7 +88,13 @@ pub(super) fn measure(scene: &Scene, hits: &Hits, charting: &mut Charting, densi
                     let ray = face.point(s) - lens.eye;
                     let (z, slant) = (ray.dot(lens.forward).max(1e-12), ray.dot(face.normal).abs());
                     // Square root of the pixels a unit of area covers: f^2 cos / (z^3 / l).
-                    figures.densities[bin(lens.focal * (slant / (z * z * z)).sqrt())] += 1;
+                    let chart = &charting.charts[charting.chart_of[id] as usize];
+                    let unit = match chart.projection {
+                        // Flattened lengths shrink with the distance from the view's eye.
+                        Projection::Point(eye, [_, _, back], near) => ((eye - face.point(s)).dot(back) / near).max(1e-3),
+                        _ => 1.0,
+                    };
+                    figures.densities[bin(unit * lens.focal * (slant / (z * z * z)).sqrt())] += 1;
                     figures.hits += 1;
                     let [u, v, _] = charting.flat(id, f64::from(s.b), f64::from(s.c));
                     for (k, [x, y]) in turns.iter().enumerate() {
@@ -116,7 +122,7 @@ fn settle(chart: &mut Chart, figures: &Figures, turns: &[[f64; 2]; TURNS], densi
     let area = |k: usize| side(k) * side(k + TURNS / 2);
     // Level charts give straight spans: another direction has to earn it.
     let best = (1..TURNS / 2).fold(0, |best, k| if area(k) < area(best) * if best == 0 { 0.92 } else { 1.0 } { k } else { best });
-    if let Projection::Plane(axes) = &mut chart.projection {
+    if let Projection::Plane(axes) | Projection::Point(_, axes, _) = &mut chart.projection {
         let [x, y] = turns[best];
         let [u, v, n] = *axes;
         *axes = [u * x + v * y, v * x - u * y, n];
@@ -137,8 +143,8 @@ fn snap(charting: &mut Charting) {
         let (lo, hi) = &mut boxes[chart as usize];
         for c in corners {
             for k in 0..2 {
-                lo[k] = lo[k].min(c[k]);
-                hi[k] = hi[k].max(c[k]);
+                lo[k] = lo[k].min(c[k] / c[3]);
+                hi[k] = hi[k].max(c[k] / c[3]);
             }
         }
     }

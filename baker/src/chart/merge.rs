@@ -1,11 +1,13 @@
 //! Merging: faces join where the seam that goes saves more than a common projection costs.
-//! Faces and links come from `observe`, costs from `directions`; clusters go to `absorb`, then to be measured.
+//! Faces and links come from `observe`, costs from `family`; clusters go to `absorb`, then to be measured.
 
-use super::directions;
+use super::family::Family;
 use super::flat::Flat;
 use super::observe::{Faces, Links};
 use super::refine;
+use super::view::View;
 use crate::joins::root;
+use crate::scene::Scene;
 use glam::DVec3;
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -26,8 +28,8 @@ pub(super) struct Weights {
 pub(crate) struct Clusters {
     /// The cluster of each face.
     pub of: Vec<u32>,
-    /// The unit normal of each cluster's plane, towards the viewer.
-    pub normals: Vec<DVec3>,
+    /// How each cluster is projected.
+    pub views: Vec<View>,
 }
 
 /// How two neighbours touch.
@@ -65,7 +67,7 @@ struct Cluster {
     hits: f64,
     /// Its plane, while it is flat.
     flat: Option<Flat>,
-    /// What each direction costs.
+    /// What each view costs.
     costs: Vec<f64>,
     /// Its neighbours.
     near: BTreeMap<u32, Border>,
@@ -84,20 +86,21 @@ type Entry = (u64, Reverse<u32>, Reverse<u32>);
 pub(super) struct Merging<'a> {
     faces: &'a Faces,
     links: &'a Links,
-    directions: Vec<DVec3>,
+    family: Family,
+    views: Vec<View>,
     /// The group of each face.
     of: Vec<u32>,
     groups: Vec<Cluster>,
 }
 
 impl<'a> Merging<'a> {
-    /// Groups of faces, and what each direction costs them.
-    pub fn new(faces: &'a Faces, links: &'a Links) -> Self {
-        let directions = directions::candidates(&faces.list);
+    /// Groups of faces, and what each view costs them.
+    pub fn new(scene: &Scene, faces: &'a Faces, links: &'a Links, family: Family) -> Self {
+        let views = family.views(scene, &faces.list);
         let (of, count) = refine::group(faces, links);
         let mut members: Vec<Vec<u32>> = vec![Vec::new(); count];
         of.iter().enumerate().for_each(|(f, &g)| members[g as usize].push(f as u32));
-        let costs = directions::costs(&faces.list, &members, &directions);
+        let costs = family.costs(&faces.list, &members, &views);
         let flat = |f: &u32| Flat::new(&faces.list[*f as usize]);
         let cluster = |(members, costs): (&Vec<u32>, Vec<f64>)| Cluster {
             hits: members.iter().map(|&f| f64::from(faces.list[f as usize].hits)).sum(),
@@ -114,7 +117,7 @@ impl<'a> Merging<'a> {
                 }
             }
         }
-        Self { faces, links, directions, of, groups }
+        Self { faces, links, family, views, of, groups }
     }
 
     /// Merges the groups.
@@ -147,10 +150,10 @@ impl<'a> Merging<'a> {
         let sides = joining.clusters.iter().map(|cluster| {
             let cheapest = |best: usize, d: usize| if cluster.costs[d] < cluster.costs[best] { d } else { best };
             // What has been joined to another has no costs left.
-            let direction = (0..cluster.costs.len()).reduce(cheapest).map_or(DVec3::Y, |d| self.directions[d]);
-            refine::Side { direction, hits: cluster.hits, flat: cluster.flat }
+            let view = (0..cluster.costs.len()).reduce(cheapest).map_or(View::along(DVec3::Y), |d| self.views[d]);
+            refine::Side { view, hits: cluster.hits, flat: cluster.flat }
         });
-        refine::refine(self.faces, self.links, weights, of, sides.collect())
+        refine::refine(self.faces, self.links, (self.family, weights), of, sides.collect())
     }
 }
 

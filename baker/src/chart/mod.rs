@@ -3,6 +3,7 @@
 
 mod absorb;
 mod directions;
+mod family;
 mod flat;
 mod fold;
 mod islands;
@@ -12,27 +13,28 @@ mod merge;
 mod observe;
 mod price;
 mod refine;
+mod sight;
+mod view;
 
 use crate::gbuffer::Hits;
 use crate::scene::Scene;
 use glam::DVec3;
-use merge::Weights;
+use view::View;
 
+pub use family::{Choice, Family, Trial};
 pub use labels::assign;
 pub(crate) use observe::Faces;
 
 /// Not a face, not a chart.
 pub(crate) const NONE: u32 = u32::MAX;
 
-/// The candidates: for smooth shapes, for many small planes, and for planes that meet in thin ones.
-const CANDIDATES: [Weights; 3] =
-    [Weights { bent: 0.002, wide: 8.0 }, Weights { bent: 0.006, wide: 8.0 }, Weights { bent: 0.003, wide: 0.01 }];
-
 /// How a chart is flattened.
 #[derive(Clone, Copy, Debug)]
 pub enum Projection {
     /// Along the third axis onto the first two; world units.
     Plane([DVec3; 3]),
+    /// From a point: eye, axes (right, down, back), and the distance at which flattened units are world units.
+    Point(DVec3, [DVec3; 3], f64),
     /// The scene's own texture coordinates; texels of the texture.
     Texture,
 }
@@ -58,8 +60,8 @@ pub struct Charting {
     pub(crate) faces: Faces,
     /// The chart of each seen face.
     pub(crate) chart_of: Vec<u32>,
-    /// Flattened coordinates and depth of each seen face's corners.
-    pub(crate) corners: Vec<[[f64; 3]; 3]>,
+    /// Flattened coordinates, depth and scale of each seen face's corners: the first two are to be divided by the last.
+    pub(crate) corners: Vec<[[f64; 4]; 3]>,
     /// The charts.
     pub charts: Vec<Chart>,
 }
@@ -70,7 +72,33 @@ impl Charting {
     pub(crate) fn flat(&self, face: usize, b: f64, c: f64) -> [f64; 3] {
         let [p, q, r] = &self.corners[face];
         let a = 1.0 - b - c;
-        [0, 1, 2].map(|k| a * p[k] + b * q[k] + c * r[k])
+        let [x, y, depth, w] = [0, 1, 2, 3].map(|k| a * p[k] + b * q[k] + c * r[k]);
+        [x / w, y / w, depth]
+    }
+
+    /// Flattened coordinates and depth of the corners of face `face`.
+    pub(crate) fn outline(&self, face: usize) -> [[f64; 3]; 3] {
+        self.corners[face].map(|[x, y, depth, w]| [x / w, y / w, depth])
+    }
+
+    /// The barycentric `[b, c]` of the point of face `face` that its flattened triangle shows at barycentric `[b, c]`: another one where the view
+    /// is from a point.
+    pub(crate) fn weights(&self, face: usize, [b, c]: [f64; 2]) -> [f64; 2] {
+        let [p, q, r] = self.corners[face].map(|corner| corner[3]);
+        let (a, b, c) = ((1.0 - b - c) / p, b / q, c / r);
+        [b / (a + b + c), c / (a + b + c)]
+    }
+
+    /// The mean distance of each cluster from its view's eye.
+    fn depths(&self, clusters: &merge::Clusters) -> Vec<f64> {
+        let mut sums = vec![[0.0; 2]; clusters.views.len()];
+        for (face, &c) in self.faces.list.iter().zip(&clusters.of) {
+            let view = clusters.views[c as usize];
+            let depth = view.eye.map_or(1.0, |eye| (eye - face.middle()).dot(view.back));
+            sums[c as usize][0] += depth * f64::from(face.hits);
+            sums[c as usize][1] += f64::from(face.hits);
+        }
+        sums.into_iter().map(|[depth, hits]| (depth / f64::max(hits, 1.0)).max(f64::MIN_POSITIVE)).collect()
     }
 
     /// Computes the faces' flattened corners from the charts' projections.
@@ -81,21 +109,31 @@ impl Charting {
             .iter()
             .zip(&self.chart_of)
             .map(|(face, &chart)| match self.charts[chart as usize].projection {
-                Projection::Plane(axes) => face.position.map(|p| axes.map(|a| a.dot(p))),
+                Projection::Plane(axes) => face.position.map(|p| [axes[0].dot(p), axes[1].dot(p), axes[2].dot(p), 1.0]),
+                Projection::Point(eye, axes, near) => face.position.map(|p| {
+                    let [x, y, back] = axes.map(|a| a.dot(p - eye));
+                    [x, y, back, (-back).max(1e-3 * near) / near]
+                }),
                 Projection::Texture => {
                     let t = &scene.triangles[(face.surface / 2) as usize];
                     let size = islands::texture_size(scene, t.material);
-                    t.uv.map(|uv| [f64::from(uv.x) * size[0], f64::from(uv.y) * size[1], 0.0])
+                    t.uv.map(|uv| [f64::from(uv.x) * size[0], f64::from(uv.y) * size[1], 0.0, 1.0])
                 }
             })
             .collect();
     }
 }
 
-/// Cuts what is seen into charts with at most `density` texels a pixel, for a source image of sides up to `max_side`.
-/// A scene that brings its own flattening (every triangle has an island) keeps it, at `density` of its texels, at most all.
-pub fn build(scene: &Scene, hits: &Hits, density: f64, max_side: u32) -> Charting {
-    let own = !scene.triangles.is_empty() && scene.triangles.iter().all(|t| t.island.is_some());
+/// Whether the scene brings a flattening of its own: every triangle has an island.
+#[must_use]
+pub fn brings_own(scene: &Scene) -> bool {
+    !scene.triangles.is_empty() && scene.triangles.iter().all(|t| t.island.is_some())
+}
+
+/// Cuts what is seen into charts with at most `density` texels a pixel, for a source image of sides up to `max_side`. The scene's own flattening
+/// is kept at `density` of its texels, at most all; `Family::Own` is `Family::Planes` for a scene without.
+pub fn build(scene: &Scene, hits: &Hits, family: Family, density: f64, max_side: u32) -> Charting {
+    let own = family == Family::Own && brings_own(scene);
     let (faces, links) = observe::observe(scene, hits, !own);
     if own {
         let mut charting = islands::build(scene, hits, faces);
@@ -103,9 +141,9 @@ pub fn build(scene: &Scene, hits: &Hits, density: f64, max_side: u32) -> Chartin
         charting.charts.iter_mut().for_each(|chart| chart.density *= density.min(1.0));
         return charting;
     }
-    let merging = merge::Merging::new(&faces, &links);
     let mut candidates: Vec<merge::Clusters> = Vec::new();
-    for weights in CANDIDATES {
+    let merging = merge::Merging::new(scene, &faces, &links, family);
+    for &weights in family.weights() {
         let mut clusters = merging.merge(weights);
         absorb::absorb(&faces, &links, &mut clusters, hits.samples.len());
         if candidates.iter().all(|c| c.of != clusters.of) {
@@ -115,8 +153,9 @@ pub fn build(scene: &Scene, hits: &Hits, density: f64, max_side: u32) -> Chartin
     let mut charting = Charting { charts: Vec::new(), chart_of: Vec::new(), corners: Vec::new(), faces };
     let mut best: Option<(f64, Vec<u32>, Vec<Chart>)> = None;
     for clusters in candidates {
-        let plane = |&n: &DVec3| Chart { projection: Projection::Plane(measure::axes(n)), density, lo: [0.0; 2], hi: [0.0; 2], hits: 0 };
-        charting.charts = clusters.normals.iter().map(plane).collect();
+        let chart =
+            |(view, depth): (&View, f64)| Chart { projection: view.projection(depth), density, lo: [0.0; 2], hi: [0.0; 2], hits: 0 };
+        charting.charts = clusters.views.iter().zip(charting.depths(&clusters)).map(chart).collect();
         charting.chart_of = clusters.of;
         measure::measure(scene, hits, &mut charting, density, max_side);
         let price = price::price(hits, &charting);

@@ -6,7 +6,7 @@ use crate::gbuffer::{BACKGROUND, Hits, Lens, Sample};
 use crate::scene::Scene;
 use glam::DVec3;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicI32, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicI64, AtomicU32, Ordering};
 
 /// A surface that at least one pixel sees.
 pub(crate) struct Face {
@@ -16,11 +16,18 @@ pub(crate) struct Face {
     pub hits: u32,
     /// Unit normal towards the side it is mostly seen from; zero for a degenerate face.
     pub normal: DVec3,
+    /// Unit vector to where it is seen from, the mean over its pixels.
+    pub view: DVec3,
     /// Corners, world space.
     pub position: [DVec3; 3],
 }
 
 impl Face {
+    /// Its centroid.
+    pub fn middle(&self) -> DVec3 {
+        (self.position[0] + self.position[1] + self.position[2]) / 3.0
+    }
+
     pub fn point(&self, sample: &Sample) -> DVec3 {
         let (b, c) = (f64::from(sample.b), f64::from(sample.c));
         self.position[0] * (1.0 - b - c) + self.position[1] * b + self.position[2] * c
@@ -113,31 +120,50 @@ pub(crate) fn observe(scene: &Scene, hits: &Hits, linked: bool) -> (Faces, Links
             of[surface] = list.len() as u32;
             let position = scene.triangles[surface / 2].position;
             let normal = (position[1] - position[0]).cross(position[2] - position[0]).normalize_or_zero();
-            list.push(Face { surface: surface as u32, hits, normal, position });
+            list.push(Face { surface: surface as u32, hits, normal, view: DVec3::ZERO, position });
         }
     }
     let faces = Faces { list, of };
-    let votes: Vec<AtomicI32> = faces.list.iter().map(|_| AtomicI32::new(0)).collect();
+    let views: Vec<Views> = faces.list.iter().map(|_| Views::default()).collect();
     let pairs: Vec<Vec<(u64, u32)>> = hits
         .samples
         .par_chunks(frame_size.max(1))
         .enumerate()
-        .map(|(f, frame)| look(&Lens::new(scene, f as u32), hits.width as usize, frame, &faces, &votes, linked))
+        .map(|(f, frame)| look(&Lens::new(scene, f as u32), hits.width as usize, frame, &faces, &views, linked))
         .collect();
     let mut pairs: Vec<(u64, u32)> = pairs.concat();
     pairs.par_sort_unstable();
     let links = Links::new(faces.list.len(), &merge(pairs));
     let Faces { mut list, of } = faces;
-    for (face, votes) in list.iter_mut().zip(votes) {
-        if votes.into_inner() < 0 {
+    for (face, views) in list.iter_mut().zip(views) {
+        if views.side.into_inner() < 0 {
             face.normal = -face.normal;
         }
+        face.view = DVec3::from_array(views.sum.map(|v| v.into_inner() as f64)).normalize_or(face.normal);
     }
     (Faces { list, of }, links)
 }
 
+/// Where a face is seen from. Whole numbers: sums do not depend on the order.
+#[derive(Default)]
+struct Views {
+    /// Pixels that see its front less those that see its back.
+    side: AtomicI64,
+    /// The sum of unit vectors to the eye, 2^20ths.
+    sum: [AtomicI64; 3],
+}
+
+impl Views {
+    fn add(&self, to_eye: DVec3, normal: DVec3) {
+        self.side.fetch_add(if to_eye.dot(normal) > 0.0 { 1 } else { -1 }, Ordering::Relaxed);
+        for (sum, v) in self.sum.iter().zip(to_eye.normalize_or_zero().to_array()) {
+            sum.fetch_add((v * f64::from(1 << 20)) as i64, Ordering::Relaxed);
+        }
+    }
+}
+
 /// One frame: votes for each face's side, and the pairs of faces that continue each other.
-fn look(lens: &Lens, width: usize, frame: &[Sample], faces: &Faces, votes: &[AtomicI32], linked: bool) -> Vec<(u64, u32)> {
+fn look(lens: &Lens, width: usize, frame: &[Sample], faces: &Faces, views: &[Views], linked: bool) -> Vec<(u64, u32)> {
     let mut pairs = Vec::new();
     let mut above: Vec<(u32, DVec3)> = vec![(NONE, DVec3::ZERO); width];
     for row in frame.chunks(width.max(1)) {
@@ -151,8 +177,7 @@ fn look(lens: &Lens, width: usize, frame: &[Sample], faces: &Faces, votes: &[Ato
             let id = faces.of[sample.surface as usize];
             let face = &faces.list[id as usize];
             let point = face.point(sample);
-            let side = if (point - lens.eye).dot(face.normal) < 0.0 { 1 } else { -1 };
-            votes[id as usize].fetch_add(side, Ordering::Relaxed);
+            views[id as usize].add(lens.eye - point, face.normal);
             if linked {
                 for (other, at) in [left, *above] {
                     if other != NONE && other != id && continuous(lens, [face, &faces.list[other as usize]], [point, at]) {

@@ -2,10 +2,11 @@
 //! Faces and links come from `observe`; `merge` calls both.
 
 use super::NONE;
-use super::directions;
+use super::family::Family;
 use super::flat::Flat;
 use super::merge::{Border, Clusters, Weights};
 use super::observe::{Faces, Links};
+use super::view::View;
 use glam::DVec3;
 use std::cmp::Reverse;
 
@@ -52,28 +53,34 @@ pub(super) fn group(faces: &Faces, links: &Links) -> (Vec<u32>, usize) {
 
 /// A cluster whose faces may change sides.
 pub(super) struct Side {
-    /// Along which it is projected.
-    pub direction: DVec3,
+    /// How it is projected.
+    pub view: View,
     /// Pixels that see it.
     pub hits: f64,
     /// Its plane, if it is flat.
     pub flat: Option<Flat>,
 }
 
-/// Turns every cluster's direction to its faces', then lets faces change sides, until neither helps.
-pub(super) fn refine(faces: &Faces, links: &Links, weights: Weights, mut of: Vec<u32>, mut sides: Vec<Side>) -> Clusters {
+/// Turns every cluster's view to its faces, then lets faces change sides, until neither helps.
+pub(super) fn refine(
+    faces: &Faces,
+    links: &Links,
+    (family, weights): (Family, Weights),
+    mut of: Vec<u32>,
+    mut sides: Vec<Side>,
+) -> Clusters {
     for _ in 0..ROUNDS {
-        turn(faces, &of, &mut sides);
-        if !exchange(faces, links, weights, &mut of, &sides) {
+        turn(faces, family, &of, &mut sides);
+        if !exchange(faces, links, (family, weights), &mut of, &sides) {
             break;
         }
     }
-    turn(faces, &of, &mut sides);
+    turn(faces, family, &of, &mut sides);
     components(links, &of, &sides)
 }
 
 /// Moves each face to the neighbouring cluster where it costs least; returns whether any moved.
-fn exchange(faces: &Faces, links: &Links, weights: Weights, of: &mut [u32], sides: &[Side]) -> bool {
+fn exchange(faces: &Faces, links: &Links, (family, weights): (Family, Weights), of: &mut [u32], sides: &[Side]) -> bool {
     let mut moved = false;
     let mut around: Vec<(u32, Border)> = Vec::new();
     for f in 0..of.len() {
@@ -99,7 +106,7 @@ fn exchange(faces: &Faces, links: &Links, weights: Weights, of: &mut [u32], side
                 Some(_) => weights.bent * side.hits,
                 None => weights.bent * hits,
             };
-            hits * directions::cost(face.normal.dot(side.direction)) + bend - border.saved(hits, weights.wide)
+            hits * family.cost(face, &side.view) + bend - border.saved(hits, weights.wide)
         };
         let stay = (of[f], price(&around[0]));
         let (to, _) = around.iter().map(|a| (a.0, price(a))).fold(stay, |least, a| if a.1 < least.1 - 1e-9 { a } else { least });
@@ -109,8 +116,8 @@ fn exchange(faces: &Faces, links: &Links, weights: Weights, of: &mut [u32], side
     moved
 }
 
-/// Takes a cluster's mean normal for its direction where that costs less.
-fn turn(faces: &Faces, of: &[u32], sides: &mut [Side]) {
+/// Projects a cluster along its mean normal where that costs less.
+fn turn(faces: &Faces, family: Family, of: &[u32], sides: &mut [Side]) {
     let mut sums = vec![DVec3::ZERO; sides.len()];
     for (face, &c) in faces.list.iter().zip(of) {
         sums[c as usize] += face.normal * f64::from(face.hits);
@@ -119,25 +126,25 @@ fn turn(faces: &Faces, of: &[u32], sides: &mut [Side]) {
     let mut gains = vec![0.0f64; sides.len()];
     for (face, &c) in faces.list.iter().zip(of) {
         if let Some(mean) = mean[c as usize] {
-            let [old, new] = [sides[c as usize].direction, mean].map(|d| directions::cost(face.normal.dot(d)));
+            let [old, new] = [sides[c as usize].view, View::along(mean)].map(|v| family.cost(face, &v));
             gains[c as usize] += f64::from(face.hits) * (old - new);
         }
     }
     for ((side, mean), gain) in sides.iter_mut().zip(mean).zip(gains) {
-        side.direction = mean.filter(|_| gain > 0.0).unwrap_or(side.direction);
+        side.view = mean.filter(|_| gain > 0.0 && side.view.eye.is_none()).map_or(side.view, View::along);
     }
 }
 
 /// The connected parts of the clusters, in the order of their first faces.
 fn components(links: &Links, of: &[u32], sides: &[Side]) -> Clusters {
-    let mut out = Clusters { of: vec![NONE; of.len()], normals: Vec::new() };
+    let mut out = Clusters { of: vec![NONE; of.len()], views: Vec::new() };
     let mut stack = Vec::new();
     for seed in 0..of.len() as u32 {
         if out.of[seed as usize] != NONE {
             continue;
         }
-        let id = out.normals.len() as u32;
-        out.normals.push(sides[of[seed as usize] as usize].direction);
+        let id = out.views.len() as u32;
+        out.views.push(sides[of[seed as usize] as usize].view);
         out.of[seed as usize] = id;
         stack.push(seed);
         while let Some(f) = stack.pop() {

@@ -1,0 +1,91 @@
+//! The choice of charts: each family flattens and codes the scene at half the size, and what costs least in bytes and quality is kept.
+//! Scenes and settings come from `job`, which bakes what is chosen; the report and the bundle say why.
+
+use crate::atlas::{self, Storage};
+use crate::bake::{self, BakeError, Progress, Settings};
+use crate::chart::{self, Choice, Family, Trial};
+use crate::job::something_seen;
+use crate::scene::Scene;
+use crate::truth::{Truth, spread};
+use crate::verify;
+
+/// Screens narrower or lower than this are tried as they are.
+const SMALL: u32 = 160;
+/// Frames that a trial has at most.
+const FRAMES: u32 = 128;
+/// Frames compared with the truth.
+const COMPARED: u32 = 8;
+/// The picture of half the size, in parts of the whole one: a little over a quarter, since outlines shrink less than areas.
+const PICTURE: f64 = 1.0 / 3.5;
+/// Tries the families on `scene`: those that can flatten it, the scene's own among them if it brings one.
+///
+/// # Errors
+/// [`BakeError`] where no family can bake the scene.
+pub fn charts(scene: &Scene, settings: &Settings, progress: Progress<'_>) -> Result<Choice, BakeError> {
+    let families: &[Family] =
+        if chart::brings_own(scene) { &[Family::Own, Family::Planes, Family::Sight] } else { &[Family::Planes, Family::Sight] };
+    let (small, settings) = halved(scene, settings);
+    let truth = Truth::new(&small);
+    let frames = spread(small.playback.frames, COMPARED);
+    let mut refused = None;
+    let mut choice = Choice::from(Family::Planes);
+    for ((at, &family), trial) in families.iter().enumerate().zip(&mut choice.trials) {
+        progress("trying charts", at as f64 / families.len() as f64);
+        let settings = Settings { atlas: atlas::Settings { charts: family.into(), ..settings.atlas }, ..settings };
+        match attempt(&small, &settings, &truth, &frames) {
+            Ok((keys, picture, psnr)) => {
+                let keys = keys * f64::from(scene.playback.frames) / f64::from(small.playback.frames.max(1));
+                let scale = if small.playback.width < scene.playback.width { PICTURE } else { 1.0 };
+                *trial = Some(Trial { family, bytes: (keys + picture / scale) as u64, psnr });
+            }
+            Err(error) => refused = refused.or(Some(error)),
+        }
+    }
+    progress("trying charts", 1.0);
+    // Of equals the first.
+    let best = choice.tried().reduce(|best, t| if t.worth() > best.worth() { t } else { best }).map(|t| t.family);
+    match (best, refused) {
+        (None, Some(error)) => Err(error),
+        (best, _) => Ok(Choice { family: best.unwrap_or(choice.family), ..choice }),
+    }
+}
+
+/// The scene at half the size and the settings for it: the key-ray grid stays as it is.
+fn halved(scene: &Scene, settings: &Settings) -> (Scene, Settings) {
+    let (mut small, mut settings) = (scene.clone(), *settings);
+    let play = &mut small.playback;
+    play.frames = play.frames.min(FRAMES);
+    if play.width.min(play.height) >= SMALL && settings.cell > 4 {
+        (play.width, play.height, settings.cell) = (play.width / 2, play.height / 2, settings.cell / 2);
+    }
+    settings.atlas.storage = Storage::Packed;
+    (small, settings)
+}
+
+/// Bytes of keys, bytes of the picture, and PSNR against the truth.
+fn attempt(scene: &Scene, settings: &Settings, truth: &Truth<'_>, frames: &[u32]) -> Result<(f64, f64, f64), BakeError> {
+    let flat = bake::flatten(scene, &settings.atlas, &|_, _| {})?;
+    something_seen(&flat)?;
+    let encoded = bake::encode(scene, &flat, settings, &|_, _| {})?;
+    let picture = crate::encode::image_bytes(&flat.atlas.image, settings.atlas.storage);
+    let psnr = verify::against_truth(&encoded.bundle, truth, frames, &|_, _| {})?.psnr_mean;
+    Ok(((encoded.bundle.len().saturating_sub(picture)) as f64, picture as f64, psnr))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::builtin;
+
+    #[test]
+    fn every_family_is_tried_on_a_scene_with_islands() {
+        let mut scene = builtin::build("pyramid").expect("there is one");
+        (scene.playback.width, scene.playback.height, scene.playback.frames) = (96, 64, 9);
+        let choice = charts(&scene, &Settings::default(), &|_, _| {}).expect("it bakes");
+        let tried: Vec<Family> = choice.tried().map(|t| t.family).collect();
+        assert_eq!(tried, [Family::Own, Family::Planes, Family::Sight]);
+        assert!(choice.tried().all(|t| t.bytes > 100 && t.psnr > 20.0), "{choice:?}");
+        let best = choice.tried().map(|t| t.worth()).fold(f64::NEG_INFINITY, f64::max);
+        assert!(choice.tried().any(|t| t.family == choice.family && t.worth() == best));
+    }
+}
