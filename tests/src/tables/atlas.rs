@@ -117,7 +117,8 @@ fn deflated(image: &SourceImage) -> Result<usize> {
         Ok(file.len())
     };
     let mask: Vec<u8> = image.covered.iter().map(|&covered| u8::from(covered)).collect();
-    Ok(size(&image.texels)? + if image.labels.iter().any(|label| label.masked) { size(&mask)? } else { 0 })
+    Ok(size(&image.texels.iter().map(|&texel| texel as u8).collect::<Vec<_>>())?
+        + if image.labels.iter().any(|label| label.masked) { size(&mask)? } else { 0 })
 }
 
 /// The table of the rows that [`measure`] gave.
