@@ -11,7 +11,7 @@ use crate::scene::Scene;
 use crate::sheets::{self, KeyGrid, Layers};
 use crate::trace::Tracer;
 use crate::verify::VerifyError;
-use crate::{fields, fit, order, polish, tears, timing};
+use crate::{fields, fit, order, polish, spare, tears, timing};
 use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC};
 use std::time::Instant;
 use thiserror::Error;
@@ -109,6 +109,8 @@ pub struct Settings {
     pub atlas: atlas::Settings,
     /// The keys.
     pub coding: CodingSettings,
+    /// Keys are coded coarser than that where it hardly shows.
+    pub spare: bool,
     /// A label seen in fewer pixels of a cell and interval is left out of it; a torn part of one in fewer than twice as many.
     pub least_pixels: u32,
     /// Wrong pixels that a field has to save in a cell and interval to be used.
@@ -127,6 +129,7 @@ impl Default for Settings {
             space: SPACE_CUBIC,
             atlas: atlas::Settings::default(),
             coding: CodingSettings { step_log2: 0, lambda: 0.01, independent_every: 16 },
+            spare: false,
             least_pixels: 8,
             field_price: 4,
             coverage: Coverage::All,
@@ -234,7 +237,13 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let (planes, cameras) = planes::records(&charts, &layers.by_label(image.labels.len()), &lenses, &grid);
     let content =
         Content { grid: &grid, image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields, planes: &planes, cameras: &cameras };
-    let bundle = encode::bundle(&content, settings.coding, header)?;
+    let code =
+        |lambda| -> Result<Vec<u8>, BakeError> { Ok(encode::bundle(&content, CodingSettings { lambda, ..settings.coding }, header)?) };
+    let bundle = if settings.spare {
+        spare::spare(&flat.atlas, encode::image_bytes(image, settings.atlas.storage), code)?
+    } else {
+        code(settings.coding.lambda)?
+    };
     progress("coding keys", 1.0);
     Ok(Encoded { bundle, grid, dropped_pixels: sheets.dropped, torn_by_cause, seconds: start.elapsed().as_secs_f64() })
 }

@@ -117,6 +117,12 @@ pub struct Bake {
     /// flattening of its own, as built-in ones do, keeps it.
     #[arg(long, value_enum, value_name = "KIND")]
     pub charts: Option<Charts>,
+    /// What a bit of the keys is worth, 0 to 100 [default: auto]: more takes fewer bytes at less quality.
+    ///
+    /// Auto takes 0.01, 0.05, 0.2 or 1, the coarsest that pays: halving the keys' bytes may cost 1.5 dB. Rough land is as good at 1; a flat
+    /// picture of fine stripes needs 0.01. Searches (--budget, --psnr) choose on their own.
+    #[arg(long, value_name = "WORTH", value_parser = lambda)]
+    pub lambda: Option<f64>,
     /// Every Nth key needs no earlier one: a seek decodes at most N + 1 keys.
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=1000))]
     pub independent_every: u16,
@@ -316,6 +322,7 @@ impl Bake {
             },
             storage: self.storage.map(storage),
             charts: self.charts.and_then(charts).map(Into::into),
+            lambda: self.lambda.map(|lambda| lambda as f32),
             independent_every: self.independent_every.into(),
             goal,
             truth: self.truth,
@@ -364,6 +371,10 @@ fn ranged(text: &str, range: std::ops::RangeInclusive<f64>, what: &str) -> Resul
 
 fn density(text: &str) -> Result<f64, String> {
     ranged(text, 0.05..=8.0, "texels a pixel")
+}
+
+fn lambda(text: &str) -> Result<f64, String> {
+    ranged(text, 0.0..=100.0, "what a bit is worth")
 }
 
 fn psnr(text: &str) -> Result<f64, String> {

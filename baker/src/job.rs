@@ -59,6 +59,8 @@ pub struct Options {
     pub storage: Option<Storage>,
     /// How the surface is cut and flattened, in place of `source.charts`; `None`: the baker tries.
     pub charts: Option<Choice>,
+    /// What a bit of the keys is worth, as [`Settings::coding`] has it; `None`: as much as hardly shows.
+    pub lambda: Option<f32>,
     /// Every this many keys one that needs no earlier one.
     pub independent_every: usize,
     /// What to reach.
@@ -80,6 +82,7 @@ impl Default for Options {
             source: atlas::Settings::default(),
             storage: None,
             charts: None,
+            lambda: None,
             independent_every: Settings::default().coding.independent_every,
             goal: Goal::AsSet,
             truth: TruthFrames::Most(16),
@@ -94,6 +97,7 @@ impl Options {
     pub fn settings(&self, width: u32) -> Settings {
         let mut settings = Settings { atlas: self.source(), ..Settings::default() };
         settings.coding.independent_every = self.independent_every;
+        settings.coding.lambda = self.lambda.unwrap_or(settings.coding.lambda);
         settings.cell = self.cell.unwrap_or(if width > WIDE { 16 } else { settings.cell });
         settings.key_interval = self.key_interval.unwrap_or(settings.key_interval);
         settings.time = self.time.unwrap_or(settings.time);
@@ -171,6 +175,7 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
         Goal::AsSet => {
             let flat = bake::flatten(scene, &settings.atlas, progress)?;
             something_seen(&flat)?;
+            let settings = Settings { spare: options.lambda.is_none(), ..settings };
             let encoded = bake::encode(scene, &flat, &settings, progress)?;
             Chosen { flat, encoded, settings, search_seconds: 0.0, warnings: Vec::new() }
         }

@@ -29,6 +29,7 @@ mod samples;
 pub mod scene;
 pub mod shade;
 pub mod sheets;
+mod spare;
 pub mod tears;
 pub mod timing;
 pub mod trace;

@@ -38,6 +38,7 @@ const COLUMNS: [(&str, &str, usize); 20] = [
     ("gif_bytes_per_frame", "GIF/frame", 0),
     ("exact_psnr", "PSNR exact", 2),
     ("truth_psnr", "PSNR truth", 2),
+    ("smooth_psnr", "softened", 2),
     ("atlas_seconds", "charts s", 1),
     ("seconds", "bake s", 1),
 ];
@@ -103,6 +104,7 @@ fn own(baked: &Baked) -> Result<Value> {
         "bytes_per_frame": report.bytes.per_frame,
         "exact_psnr": report.quality.psnr_mean,
         "truth_psnr": report.quality_vs_truth.as_ref().map(|truth| truth.psnr_mean),
+        "smooth_psnr": report.quality_vs_truth.as_ref().map(|truth| truth.psnr_smooth),
         "atlas_seconds": report.seconds.atlas,
         "seconds": report.seconds.total,
     }))
