@@ -58,7 +58,7 @@ fn halved(scene: &Scene, settings: &Settings) -> (Scene, Settings) {
     if play.width.min(play.height) >= SMALL {
         (play.width, play.height) = (play.width / 2, play.height / 2);
     }
-    settings.atlas.storage = Storage::Packed;
+    (settings.atlas.storage, settings.spare) = (Storage::Packed, false);
     (small, settings)
 }
 

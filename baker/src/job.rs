@@ -98,6 +98,8 @@ impl Options {
         let mut settings = Settings { atlas: self.source(), ..Settings::default() };
         settings.coding.independent_every = self.independent_every;
         settings.coding.lambda = self.lambda.unwrap_or(settings.coding.lambda);
+        // The other searches look for what a bit is worth themselves.
+        settings.spare = self.lambda.is_none() && matches!(self.goal, Goal::AsSet | Goal::Ram(_));
         settings.cell = self.cell.unwrap_or(if width > WIDE { 16 } else { settings.cell });
         settings.key_interval = self.key_interval.unwrap_or(settings.key_interval);
         settings.time = self.time.unwrap_or(settings.time);
@@ -175,7 +177,6 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
         Goal::AsSet => {
             let flat = bake::flatten(scene, &settings.atlas, progress)?;
             something_seen(&flat)?;
-            let settings = Settings { spare: options.lambda.is_none(), ..settings };
             let encoded = bake::encode(scene, &flat, &settings, progress)?;
             Chosen { flat, encoded, settings, search_seconds: 0.0, warnings: Vec::new() }
         }
