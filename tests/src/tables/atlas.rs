@@ -19,7 +19,7 @@ use serde_json::{Value, json};
 pub const SCENES: [&str; 5] = ["cone-orbit", "street", "terrain", "columns", "torus"];
 
 /// The columns: the key in JSON, the title, digits after the point; the first two are words.
-const COLUMNS: [(&str, &str, usize); 20] = [
+const COLUMNS: [(&str, &str, usize); 21] = [
     ("scene", "scene", 0),
     ("candidate", "candidate", 0),
     ("charts", "charts", 0),
