@@ -95,8 +95,8 @@ pub struct Bake {
     pub density: f64,
     /// What a texel of the source image is, and so what it costs.
     ///
-    /// A player names the kinds it plays in its type: Player<Indexed8> (which Player alone means), Player<Indexed4>, Player<Direct565>, or
-    /// Player<AnyTexels>; a firmware links the code of no others. All kinds are stored --storage raw or packed.
+    /// A player names the kinds it plays in its type: Player of Indexed8 (which Player alone means), of Indexed4, of Direct565, or of
+    /// AnyTexels; a firmware links the code of no others. All kinds are stored --storage raw or packed.
     #[arg(long, value_enum, value_name = "BITS", default_value_t = Texels::Eight)]
     pub texels: Texels,
     /// Colours of the source image, at most, 2 to 256; at most 16 with --texels 4, none with 565 [default: 256; 16 with --texels 4].
