@@ -3,6 +3,7 @@
 
 use crate::atlas::{self, Atlas, AtlasError, SourceImage};
 use crate::causes::{self, Causes};
+use crate::chart;
 use crate::encode::{self, CodingSettings, Content};
 use crate::folds::{self, Folded};
 use crate::gbuffer::{Hits, Lens};
@@ -174,19 +175,36 @@ pub struct Encoded {
 /// # Errors
 /// [`BakeError`] where the settings are out of range or the charts do not fit.
 pub fn flatten(scene: &Scene, settings: &atlas::Settings, progress: Progress<'_>) -> Result<Flat, BakeError> {
-    let part = |done: u64, total: u64| done as f64 / total.max(1) as f64;
     let start = Instant::now();
     progress("building the hierarchy", 0.0);
     let tracer = Tracer::new(scene);
     let hits = Hits::cast(scene, &tracer, &|done, total| progress("casting rays", part(done, total)));
     let ray_seconds = start.elapsed().as_secs_f64();
+    flatten_hits(scene, (&tracer, &hits, ray_seconds), settings, progress)
+}
+
+/// Makes the source image of rays that are cast, in so many seconds.
+///
+/// # Errors
+/// Those of [`flatten`].
+pub(crate) fn flatten_hits(
+    scene: &Scene,
+    (tracer, hits, ray_seconds): (&Tracer<'_>, &Hits, f64),
+    settings: &atlas::Settings,
+    progress: Progress<'_>,
+) -> Result<Flat, BakeError> {
     let start = Instant::now();
-    let atlas = atlas::build(scene, &hits, settings, &|done, total| progress("flattening surfaces", part(done, total)))?;
+    let atlas = atlas::build(scene, hits, settings, &|done, total| progress("flattening surfaces", part(done, total)))?;
     progress("looking for tears", 0.0);
-    let tears = tears::find(scene, &tracer, &hits, &atlas.gbuffer);
-    let seams = causes::seams(scene, &hits, &atlas.gbuffer);
-    let planes = planes::find(scene, &hits, &atlas.gbuffer, atlas.image.labels.len());
+    let tears = tears::find(scene, tracer, hits, &atlas.gbuffer);
+    let seams = causes::seams(scene, hits, &atlas.gbuffer);
+    let planes = planes::find(scene, hits, &atlas.gbuffer, atlas.image.labels.len());
     Ok(Flat { tears, seams, planes, rays: hits.samples.len() as u64, atlas, ray_seconds, atlas_seconds: start.elapsed().as_secs_f64() })
+}
+
+/// How much of `total` is done, 0..=1.
+fn part(done: u64, total: u64) -> f64 {
+    done as f64 / total.max(1) as f64
 }
 
 /// Fits and codes the keys, and puts the bundle together.
@@ -232,7 +250,8 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let fields = polish::polish(fields, gbuffer, &grid, &sheets, &layers);
     progress("coding keys", 0.8);
     let choice = settings.atlas.charts;
-    let info = if choice.tried().next().is_some() { format!("{}; {}", scene.name, choice.reason()) } else { scene.name.clone() };
+    let reason = || chart::reason(choice.family, choice.tried());
+    let info = if choice.tried().next().is_some() { format!("{}; {}", scene.name, reason()) } else { scene.name.clone() };
     let header = encode::Header { storage: settings.atlas.storage, fps: scene.playback.fps, info: &info };
     let (planes, cameras) = planes::records(&charts, &layers.by_label(image.labels.len()), &lenses, &grid);
     let content =

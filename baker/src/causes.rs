@@ -5,7 +5,6 @@ use crate::gbuffer::{GBuffer, Hits, Lens};
 use crate::scene::Scene;
 use crate::sheets::{KeyGrid, Sheets};
 use crate::tears::{DOWN, NEXT, RIGHT};
-use glam::DVec3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -60,11 +59,7 @@ fn goes_on(scene: &Scene, hits: &Hits, gbuffer: &GBuffer, lens: &Lens, pixels: [
     }
     let [from, to] = pixels.map(|pixel| hits.samples[pixel].point(scene));
     let gap = from.distance(to);
-    let off = pixels.map(|pixel| {
-        let [a, b, c] = scene.triangles[(hits.samples[pixel].surface / 2) as usize].position;
-        let normal: DVec3 = (b - a).cross(c - a).normalize_or_zero();
-        (to - from).dot(normal).abs()
-    });
+    let off = pixels.map(|pixel| (to - from).dot(hits.samples[pixel].normal(scene)).abs());
     gap < FOOTPRINTS * from.distance(lens.eye) / lens.focal || off[0].min(off[1]) < LEVEL * gap
 }
 

@@ -2,10 +2,12 @@
 //! Scenes and settings come from `job`, which bakes what is chosen; the report and the bundle say why.
 
 use crate::atlas::{self, Storage};
-use crate::bake::{self, BakeError, Progress, Settings};
+use crate::bake::{self, BakeError, Flat, Progress, Settings};
 use crate::chart::{self, Choice, Family, Trial};
+use crate::gbuffer::Hits;
 use crate::job::something_seen;
 use crate::scene::Scene;
+use crate::trace::Tracer;
 use crate::truth::{Truth, spread};
 use crate::verify;
 
@@ -17,6 +19,7 @@ const FRAMES: u32 = 128;
 const COMPARED: u32 = 8;
 /// The picture of half the size, in parts of the whole one: a little over a quarter, since outlines shrink less than areas.
 const PICTURE: f64 = 1.0 / 3.5;
+
 /// Tries the families on `scene`: those that can flatten it, the scene's own among them if it brings one.
 ///
 /// # Errors
@@ -25,6 +28,8 @@ pub fn charts(scene: &Scene, settings: &Settings, progress: Progress<'_>) -> Res
     let families: &[Family] =
         if chart::brings_own(scene) { &[Family::Own, Family::Planes, Family::Sight] } else { &[Family::Planes, Family::Sight] };
     let (small, settings) = halved(scene, settings);
+    let tracer = Tracer::new(&small);
+    let hits = Hits::cast(&small, &tracer, &|_, _| {});
     let truth = Truth::new(&small);
     let frames = spread(small.playback.frames, COMPARED);
     let mut refused = None;
@@ -32,7 +37,8 @@ pub fn charts(scene: &Scene, settings: &Settings, progress: Progress<'_>) -> Res
     for ((at, &family), trial) in families.iter().enumerate().zip(&mut choice.trials) {
         progress("trying charts", at as f64 / families.len() as f64);
         let settings = Settings { atlas: atlas::Settings { charts: family.into(), ..settings.atlas }, ..settings };
-        match attempt(&small, &settings, &truth, &frames) {
+        let flat = bake::flatten_hits(&small, (&tracer, &hits, 0.0), &settings.atlas, &|_, _| {});
+        match flat.and_then(|flat| attempt(&small, &flat, &settings, (&truth, &frames))) {
             Ok((keys, picture, psnr)) => {
                 let keys = keys * f64::from(scene.playback.frames) / f64::from(small.playback.frames.max(1));
                 let scale = if small.playback.width < scene.playback.width { PICTURE } else { 1.0 };
@@ -63,10 +69,9 @@ fn halved(scene: &Scene, settings: &Settings) -> (Scene, Settings) {
 }
 
 /// Bytes of keys, bytes of the picture, and PSNR against the truth.
-fn attempt(scene: &Scene, settings: &Settings, truth: &Truth<'_>, frames: &[u32]) -> Result<(f64, f64, f64), BakeError> {
-    let flat = bake::flatten(scene, &settings.atlas, &|_, _| {})?;
-    something_seen(&flat)?;
-    let encoded = bake::encode(scene, &flat, settings, &|_, _| {})?;
+fn attempt(scene: &Scene, flat: &Flat, settings: &Settings, (truth, frames): (&Truth<'_>, &[u32])) -> Result<(f64, f64, f64), BakeError> {
+    something_seen(flat)?;
+    let encoded = bake::encode(scene, flat, settings, &|_, _| {})?;
     let picture = crate::encode::image_bytes(&flat.atlas.image, settings.atlas.storage);
     let psnr = verify::against_truth(&encoded.bundle, truth, frames, &|_, _| {})?.psnr_mean;
     Ok(((encoded.bundle.len().saturating_sub(picture)) as f64, picture as f64, psnr))

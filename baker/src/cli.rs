@@ -111,12 +111,12 @@ pub struct Bake {
     /// an RP2040, drawing can then be faster. With --budget the search may pack what does not fit raw, unless this is given; --ram counts it.
     #[arg(long, value_enum, value_name = "KIND")]
     pub storage: Option<Storage>,
-    /// How the surface is cut into charts and flattened [default: auto].
+    /// How the surface is cut into charts and flattened.
     ///
     /// Auto tries all on the scene at half the size, and keeps what costs least in bytes and quality; the report says why. A scene that brings a
     /// flattening of its own, as built-in ones do, keeps it.
-    #[arg(long, value_enum, value_name = "KIND")]
-    pub charts: Option<Charts>,
+    #[arg(long, value_enum, value_name = "KIND", default_value_t = Charts::Auto)]
+    pub charts: Charts,
     /// What a bit of the keys is worth, 0 to 100 [default: auto]: more takes fewer bytes at less quality.
     ///
     /// Auto takes 0.01, 0.05, 0.2 or 1, the coarsest that pays: halving the keys' bytes may cost 1.5 dB. Rough land is as good at 1; a flat
@@ -294,7 +294,7 @@ impl Bake {
             Time::Linear => TIME_LINEAR,
             Time::Cubic => TIME_CUBIC,
         };
-        let charts = |charts| match charts {
+        let charts = match self.charts {
             Charts::Auto => None,
             Charts::Planes => Some(Family::Planes),
             Charts::Sight => Some(Family::Sight),
@@ -321,7 +321,7 @@ impl Bake {
                 ..atlas::Settings::default()
             },
             storage: self.storage.map(storage),
-            charts: self.charts.and_then(charts).map(Into::into),
+            charts: charts.map(Into::into),
             lambda: self.lambda.map(|lambda| lambda as f32),
             independent_every: self.independent_every.into(),
             goal,

@@ -87,6 +87,13 @@ impl Sample {
         let [a, b, c] = scene.triangles[(self.surface / 2) as usize].position;
         a + (b - a) * f64::from(self.b) + (c - a) * f64::from(self.c)
     }
+
+    /// The unit normal of the triangle that is hit, by the order of its corners; zero for a degenerate one. The sample is not [`BACKGROUND`].
+    #[must_use]
+    pub fn normal(&self, scene: &Scene) -> DVec3 {
+        let [a, b, c] = scene.triangles[(self.surface / 2) as usize].position;
+        (b - a).cross(c - a).normalize_or_zero()
+    }
 }
 
 /// One [`Sample`] at the centre of every pixel of every frame.

@@ -14,6 +14,12 @@ pub fn psnr(mse: f64) -> f64 {
     if mse <= 0.0 { PERFECT } else { (10.0 * libm::log10(255.0 * 255.0 / mse)).min(PERFECT) }
 }
 
+/// What a picture of `psnr` dB for `bytes` is worth, dB, where twice the bytes have to bring `double` dB.
+#[must_use]
+pub fn worth(psnr: f64, bytes: u64, double: f64) -> f64 {
+    psnr - double * libm::log2(bytes.max(1) as f64)
+}
+
 /// The mean squared error of two equally long rows of components; 0 for empty ones.
 #[must_use]
 pub fn mean_squared_error(a: &[u8], b: &[u8]) -> f64 {

@@ -4,7 +4,7 @@
 use crate::atlas::Storage;
 use crate::bake::{Encoded, Flat, Settings};
 use crate::causes::Causes;
-use crate::chart::{Choice, Family, Trial};
+use crate::chart::{self, Family, Trial};
 use crate::inspect::Inspection;
 use crate::scene::Scene;
 use crate::verify::{Quality, TruthQuality, Work};
@@ -111,13 +111,6 @@ pub struct Source {
     pub scale: f64,
     /// Texels between charts.
     pub gutter: u32,
-}
-
-/// Why the surface was cut as it is, in words.
-fn reason(image: &Source) -> String {
-    let mut choice = Choice::from(image.candidate);
-    choice.trials.iter_mut().zip(&image.trials).for_each(|(to, from)| *to = Some(*from));
-    choice.reason()
 }
 
 /// The report; its keys keep their names and meaning.
@@ -333,7 +326,7 @@ pub fn table(report: &Report) -> Vec<(String, String)> {
         ),
     );
     row("labels, mask", format!("{} bytes: {} labels for {} charts", grouped(bytes.labels + bytes.mask), image.labels, image.charts));
-    row("", reason(image));
+    row("", chart::reason(image.candidate, image.trials.iter()));
     row("keys", format!("{} bytes: {:.1} a frame", grouped(bytes.keys), bytes.keys_per_frame));
     row("bundle", format!("{} bytes: {:.1} a frame", grouped(bytes.bundle), bytes.per_frame));
     row(

@@ -6,8 +6,9 @@ use crate::metrics;
 use crate::truth::spread;
 use crate::verify::{self, VerifyError};
 
-/// What a bit is worth, finest first.
-const LAMBDAS: [f32; 4] = [0.01, 0.05, 0.2, 1.0];
+/// What a bit is worth at first, and then, finest first.
+const FINEST: f32 = 0.01;
+const COARSER: [f32; 3] = [0.05, 0.2, 1.0];
 /// Frames compared.
 const COMPARED: u32 = 16;
 /// What twice the bytes of a bundle's keys have to bring, dB against exact rays.
@@ -21,19 +22,22 @@ const DOUBLE: f64 = 1.5;
 pub(crate) fn spare<E: From<VerifyError>>(atlas: &Atlas, picture: usize, code: impl Fn(f32) -> Result<Vec<u8>, E>) -> Result<Vec<u8>, E> {
     let frames = spread(atlas.gbuffer.frames, COMPARED);
     let exact: Vec<Vec<u8>> = frames.iter().map(|&frame| verify::exact_frame(atlas, frame)).collect();
-    let mut best: Option<(f64, Vec<u8>)> = None;
-    for lambda in LAMBDAS {
+    let measured = |lambda| -> Result<(f64, Vec<u8>), E> {
         let bundle = code(lambda)?;
         let (mut psnr, mut rest) = (0.0, exact.iter());
         verify::play(&bundle, &frames, |_, played| {
             psnr += rest.next().map_or(0.0, |exact| metrics::psnr(metrics::mean_squared_error(played, exact)));
         })?;
-        let keys = bundle.len().saturating_sub(picture).max(1);
-        let worth = psnr / frames.len().max(1) as f64 - DOUBLE * libm::log2(keys as f64);
-        match &best {
-            Some((most, _)) if worth <= *most => break,
-            _ => best = Some((worth, bundle)),
+        let keys = bundle.len().saturating_sub(picture) as u64;
+        Ok((metrics::worth(psnr / frames.len().max(1) as f64, keys, DOUBLE), bundle))
+    };
+    let mut best = measured(FINEST)?;
+    for lambda in COARSER {
+        let next = measured(lambda)?;
+        if next.0 <= best.0 {
+            break;
         }
+        best = next;
     }
-    best.map_or_else(|| code(LAMBDAS[0]), |(_, bundle)| Ok(bundle))
+    Ok(best.1)
 }

@@ -96,7 +96,6 @@ impl Pair<'_> {
 
     /// The point that a sample sees, and its face's unit normal.
     fn point(&self, sample: Sample) -> (DVec3, DVec3) {
-        let [a, b, c] = self.scene.triangles[(sample.surface / 2) as usize].position;
-        (sample.point(self.scene), (b - a).cross(c - a).normalize_or_zero())
+        (sample.point(self.scene), sample.normal(self.scene))
     }
 }

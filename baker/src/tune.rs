@@ -12,7 +12,6 @@ use crate::samples::Samples;
 use crate::scene::Scene;
 use crate::trace::Tracer;
 use crate::verify;
-use crate::{causes, planes, tears};
 use std::time::Instant;
 
 /// Cells tried, pixels.
@@ -113,17 +112,7 @@ struct Keys {
 impl Search<'_> {
     /// The source image that `source` asks for, and what goes with it.
     pub(crate) fn flat(&self, source: atlas::Settings) -> Result<Flat, BakeError> {
-        let start = Instant::now();
-        let atlas = atlas::build(self.scene, &self.hits, &source, &|_, _| {})?;
-        let flat = Flat {
-            tears: tears::find(self.scene, &self.tracer, &self.hits, &atlas.gbuffer),
-            seams: causes::seams(self.scene, &self.hits, &atlas.gbuffer),
-            planes: planes::find(self.scene, &self.hits, &atlas.gbuffer, atlas.image.labels.len()),
-            atlas,
-            rays: self.hits.samples.len() as u64,
-            ray_seconds: self.ray_seconds,
-            atlas_seconds: start.elapsed().as_secs_f64(),
-        };
+        let flat = bake::flatten_hits(self.scene, (&self.tracer, &self.hits, self.ray_seconds), &source, &|_, _| {})?;
         job::something_seen(&flat)?;
         Ok(flat)
     }

@@ -127,19 +127,20 @@ impl<'p, 'a> Screen<'p, 'a> {
 
     /// Plays frame `frame` into `out`: R, G, B, row by row.
     pub fn play(&mut self, frame: u32, out: &mut Vec<u8>) {
-        out.clear();
         self.player.seek(Frame(frame));
-        for y in 0..self.height {
-            self.player.row(y, &mut self.row);
-            out.extend(self.row.iter().flat_map(|&pixel| rgb(pixel)));
-        }
+        self.draw(out, Player::row);
     }
 
     /// The current frame with softened outlines into `out`: R, G, B, row by row.
     fn smooth(&mut self, out: &mut Vec<u8>) {
+        self.draw(out, Player::smooth_row);
+    }
+
+    /// The current frame into `out` as `row` draws it: R, G, B, row by row.
+    fn draw(&mut self, out: &mut Vec<u8>, row: fn(&mut Player<'a, AnyTexels>, u32, &mut [u16])) {
         out.clear();
         for y in 0..self.height {
-            self.player.smooth_row(y, &mut self.row);
+            row(self.player, y, &mut self.row);
             out.extend(self.row.iter().flat_map(|&pixel| rgb(pixel)));
         }
     }
@@ -187,10 +188,7 @@ pub fn play(bytes: &[u8], frames: &[u32], mut show: impl FnMut(u32, &[u8])) -> R
 #[must_use]
 pub fn exact_frame(atlas: &Atlas, frame: u32) -> Vec<u8> {
     let (image, gbuffer) = (&atlas.image, &atlas.gbuffer);
-    let colour = |uv: &[f32; 2]| {
-        let texel = image.texels[uv[1] as usize * image.width as usize + uv[0] as usize];
-        image.palette.get(usize::from(texel)).copied().unwrap_or_default()
-    };
+    let colour = |uv: &[f32; 2]| image.colour(image.texels[uv[1] as usize * image.width as usize + uv[0] as usize]);
     gbuffer.uv[pixels_of(gbuffer, frame)].iter().flat_map(colour).collect()
 }
 
@@ -209,7 +207,7 @@ fn bilinear(image: &SourceImage, label: usize, [u, v]: [f32; 2]) -> [f32; 3] {
     let (fx, fy) = (x - x0, y - y0);
     let (left, right) = (clamp(x0 as i32, 0), clamp(x0 as i32 + 1, 0));
     let (top, bottom) = (clamp(y0 as i32, 1) * image.width as usize, clamp(y0 as i32 + 1, 1) * image.width as usize);
-    let at = |index: usize| image.palette.get(usize::from(image.texels.get(index).copied().unwrap_or(0))).copied().unwrap_or_default();
+    let at = |index: usize| image.colour(image.texels.get(index).copied().unwrap_or(0));
     let [a, b, c, d] = [top + left, top + right, bottom + left, bottom + right].map(at);
     std::array::from_fn(|k| {
         let mix = |a: u8, b: u8| f32::from(a) + (f32::from(b) - f32::from(a)) * fx;

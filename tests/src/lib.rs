@@ -11,6 +11,7 @@ pub mod random;
 pub mod reference;
 pub mod scenes;
 pub mod tables;
+pub mod tamper;
 
 /// The README's code compiles.
 #[cfg(doctest)]

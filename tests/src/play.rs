@@ -2,7 +2,7 @@
 //! Bundles come from `scenes`; pixels and probes go to the tests and to `figures`.
 
 use anyhow::Result;
-use cubist_core::{Bundle, Frame, Indexed8, Player, Probe, Texels};
+use cubist_core::{Bundle, ByteOrder, Frame, Indexed8, Player, Probe, Texels};
 
 /// Calls `visit` with every frame number of `frames` and the player that stands at it, of a bundle with a byte a texel.
 ///
@@ -62,4 +62,29 @@ pub fn frames(bytes: &[u8], frames: impl IntoIterator<Item = u32>) -> Result<Vec
     let mut pictures = Vec::new();
     visit(bytes, frames, |_, player| pictures.push(pixels(player)))?;
     Ok(pictures)
+}
+
+/// Frames of `bytes` as a player of `T` draws them, every row plain and antialiased, from memory filled with `fill`; a row is shorter than the
+/// screen.
+///
+/// # Errors
+/// The bundle does not parse, or has texels of another kind.
+pub fn both_ways<T: Texels>(bytes: &[u8], frames: &[u32], fill: u8, order: ByteOrder) -> Result<Vec<u16>> {
+    let bundle = Bundle::parse(bytes)?;
+    let (width, height) = bundle.size();
+    let mut memory = vec![fill; bundle.memory_needed()];
+    let mut player = Player::<T>::with_texels(&bundle, &mut memory)?;
+    player.set_byte_order(order);
+    let mut out = Vec::new();
+    for &frame in frames {
+        player.seek(Frame(frame));
+        for y in 0..height {
+            let mut row = vec![0; (if y == 7 { width * 3 / 5 } else { width }) as usize];
+            player.row(y, &mut row);
+            out.extend(&row);
+            player.smooth_row(y, &mut row);
+            out.extend(&row);
+        }
+    }
+    Ok(out)
 }

@@ -2,6 +2,7 @@
 //! They come from `cubist_baker::scene::builtin`; bundles go to every test.
 
 use anyhow::{Context, Result};
+use cubist_baker::atlas::Storage;
 use cubist_baker::bake::{self, Encoded, Flat, Settings};
 use cubist_baker::scene::{Scene, builtin};
 
@@ -30,6 +31,18 @@ pub fn bake(scene: &Scene, settings: &Settings) -> Result<(Flat, Encoded)> {
     let flat = bake::flatten(scene, &settings.atlas, &|_, _| {}).with_context(name)?;
     let encoded = bake::encode(scene, &flat, settings, &|_, _| {}).with_context(name)?;
     Ok((flat, encoded))
+}
+
+/// The bundles of `scene`, with its source image raw and packed.
+///
+/// # Errors
+/// Those of the baker, with the scene's name.
+pub fn raw_and_packed(scene: &Scene, settings: &Settings) -> Result<(Flat, [Vec<u8>; 2])> {
+    let mut packed = *settings;
+    packed.atlas.storage = Storage::Packed;
+    let (flat, raw) = bake(scene, settings)?;
+    let packed = bake::encode(scene, &flat, &packed, &|_, _| {}).with_context(|| format!("bake {}", scene.name))?;
+    Ok((flat, [raw.bundle, packed.bundle]))
 }
 
 /// The bytes of the bundle of the built-in scene `name` at `size` and `frames`.

@@ -11,9 +11,10 @@ use cubist_core::format::{
 use cubist_core::grid::Grid;
 use cubist_core::lists::{self, BOTH, CHART, FIELD, Lists, Sheets, SheetsRef};
 use cubist_core::plane::{CAMERA_BYTES, Camera, PLANE_BYTES, Plane, Vector};
-use cubist_core::{AnyTexels, Bundle, BundleError, Frame, Indexed8, MemoryError, Player, Texels, checksum};
+use cubist_core::{AnyTexels, Bundle, BundleError, Frame, Indexed8, MemoryError, Player, Texels};
 use cubist_tests::random::{EDGES, Random};
 use cubist_tests::scenes;
+use cubist_tests::tamper::{self, seal};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use std::sync::OnceLock;
@@ -55,14 +56,6 @@ fn packed_atlas() -> Atlas<'static> {
 /// The packed bundle with `atlas` in place of its own.
 fn with_atlas(atlas: &Atlas<'_>) -> Vec<u8> {
     with_section(packed(), ATLAS, &postcard::to_stdvec(atlas).expect("an atlas serialises"))
-}
-
-/// Puts the checksum right.
-fn seal(bytes: &mut [u8]) {
-    if let Some(body) = bytes.len().checked_sub(4) {
-        let sum = checksum(&bytes[..body]).to_le_bytes();
-        bytes[body..].copy_from_slice(&sum);
-    }
 }
 
 /// Plays three frames if `bytes` parse, from memory filled with `fill`: at most 12 rows of each. `None`: refused. Up to `walk`
@@ -108,19 +101,12 @@ fn survives(bytes: &[u8]) -> bool {
 
 /// `bytes` with `change` made to the envelope.
 fn enveloped<'a>(bytes: &'a [u8], change: impl FnOnce(&mut Envelope<'a>)) -> Vec<u8> {
-    let mut envelope: Envelope<'a> = postcard::take_from_bytes(bytes).expect("a sound envelope").0;
-    change(&mut envelope);
-    let mut bytes = postcard::to_stdvec(&envelope).expect("an envelope serialises");
-    bytes.extend([0; 4]);
-    seal(&mut bytes);
-    bytes
+    tamper::enveloped(bytes, change).expect("a sound envelope")
 }
 
 /// `bytes` with the section `tag` replaced.
 fn with_section<'a>(bytes: &'a [u8], tag: [u8; 4], section: &'a [u8]) -> Vec<u8> {
-    enveloped(bytes, |envelope| {
-        envelope.sections.iter_mut().find(|s| s.tag == tag).expect("the section is there").bytes = section;
-    })
+    tamper::with_section(bytes, tag, section).expect("the section is there")
 }
 
 fn section(tag: [u8; 4]) -> &'static [u8] {

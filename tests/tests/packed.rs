@@ -1,13 +1,12 @@
 //! Packed source images: what a bundle that holds one plays, and what memory it takes, against the same scene's with a raw one.
 //! Scenes come from `scenes`, baked both ways; real pictures go through the packer and back.
 
-use cubist_baker::atlas::Storage;
-use cubist_baker::bake::{self, Flat, Settings};
+use cubist_baker::bake::{Flat, Settings};
 use cubist_baker::encode;
 use cubist_baker::inspect::Inspection;
 use cubist_core::format::{ATLAS, MASK, TexelKind};
-use cubist_core::{Bundle, Frame, MemoryError, Player};
-use cubist_tests::scenes;
+use cubist_core::{Bundle, ByteOrder, Indexed8, MemoryError, Player};
+use cubist_tests::{play, scenes};
 
 const SIZE: [u32; 2] = [104, 78];
 const FRAMES: u32 = 12;
@@ -22,15 +21,9 @@ fn both(name: &str) -> (Flat, [Vec<u8>; 2]) {
 /// A scene baked raw and packed, with texels of `kind`.
 fn both_of(name: &str, kind: TexelKind) -> (Flat, [Vec<u8>; 2]) {
     let scene = scenes::reduced(name, SIZE, FRAMES).expect("a built-in scene");
-    let mut raw = Settings::default();
-    raw.atlas.texels = kind;
-    let flat = bake::flatten(&scene, &raw.atlas, &|_, _| {}).expect("it flattens");
-    let bundles = [Storage::Raw, Storage::Packed].map(|storage| {
-        let mut settings = raw;
-        settings.atlas.storage = storage;
-        bake::encode(&scene, &flat, &settings, &|_, _| {}).expect("it encodes").bundle
-    });
-    (flat, bundles)
+    let mut settings = Settings::default();
+    settings.atlas.texels = kind;
+    scenes::raw_and_packed(&scene, &settings).expect("it bakes")
 }
 
 /// The texels of a source image, a byte each.
@@ -38,23 +31,9 @@ fn bytes_of(flat: &Flat) -> Vec<u8> {
     flat.atlas.image.texels.iter().map(|&texel| texel as u8).collect()
 }
 
-/// All frames, plain and antialiased, from memory filled with `fill`.
+/// Some frames, plain and antialiased, from memory filled with `fill`.
 fn pixels(bytes: &[u8], fill: u8) -> Vec<u16> {
-    let bundle = Bundle::parse(bytes).expect("the baker's bytes parse");
-    let mut memory = vec![fill; bundle.memory_needed()];
-    let mut player = Player::new(&bundle, &mut memory).expect("the memory it asked for");
-    let mut out = Vec::new();
-    for frame in [0, 5, 6, 11, 2] {
-        player.seek(Frame(frame));
-        for y in 0..SIZE[1] {
-            let mut row = vec![0; SIZE[0] as usize];
-            player.row(y, &mut row);
-            out.extend(&row);
-            player.smooth_row(y, &mut row);
-            out.extend(&row);
-        }
-    }
-    out
+    play::both_ways::<Indexed8>(bytes, &[0, 5, 6, 11, 2], fill, ByteOrder::Native).expect("sound, and the memory it asked for")
 }
 
 #[test]

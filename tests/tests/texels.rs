@@ -2,13 +2,12 @@
 //! stored; and what each kind costs and keeps.
 //! Scenes come from `scenes`; bundles of 16 colours are retold in the other kinds byte by byte, here.
 
-use cubist_baker::atlas::Storage;
-use cubist_baker::bake::{self, Flat, Settings};
+use cubist_baker::bake::{Flat, Settings};
 use cubist_baker::inspect::Inspection;
 use cubist_baker::{Options, TruthFrames, bake_scene, encode};
-use cubist_core::format::{ATLAS, Atlas, Envelope, MASK, TexelKind};
-use cubist_core::{AnyTexels, Bundle, ByteOrder, Direct565, Frame, Indexed4, Indexed8, MemoryError, Player, Texels, checksum};
-use cubist_tests::scenes;
+use cubist_core::format::{ATLAS, Atlas, MASK, TexelKind};
+use cubist_core::{AnyTexels, Bundle, ByteOrder, Direct565, Indexed4, Indexed8, MemoryError, Player, Texels};
+use cubist_tests::{play, scenes, tamper};
 
 const SIZE: [u32; 2] = [104, 78];
 const FRAMES: u32 = 12;
@@ -20,26 +19,12 @@ fn baked((name, max_side): (&str, u32), kind: TexelKind) -> (Flat, [Vec<u8>; 2])
     let scene = scenes::reduced(name, SIZE, FRAMES).expect("a built-in scene");
     let mut settings = Settings::default();
     (settings.atlas.max_side, settings.atlas.texels) = (max_side, kind);
-    let flat = bake::flatten(&scene, &settings.atlas, &|_, _| {}).expect("it flattens");
-    let bundles = [Storage::Raw, Storage::Packed].map(|storage| {
-        settings.atlas.storage = storage;
-        bake::encode(&scene, &flat, &settings, &|_, _| {}).expect("it encodes").bundle
-    });
-    (flat, bundles)
+    scenes::raw_and_packed(&scene, &settings).expect("it bakes")
 }
 
 /// `bytes` with `atlas` for its source image.
 fn with_atlas(bytes: &[u8], atlas: &Atlas<'_>) -> Vec<u8> {
-    with_section(bytes, ATLAS, &postcard::to_stdvec(atlas).expect("an image serialises"))
-}
-
-/// `bytes` with the section `tag` replaced.
-fn with_section(bytes: &[u8], tag: [u8; 4], section: &[u8]) -> Vec<u8> {
-    let mut envelope: Envelope<'_> = postcard::take_from_bytes(bytes).expect("a sound envelope").0;
-    envelope.sections.iter_mut().find(|s| s.tag == tag).expect("there is one").bytes = section;
-    let mut bytes = postcard::to_stdvec(&envelope).expect("an envelope serialises");
-    bytes.extend(checksum(&bytes).to_le_bytes());
-    bytes
+    tamper::with_section(bytes, ATLAS, &postcard::to_stdvec(atlas).expect("an image serialises")).expect("a sound bundle")
 }
 
 /// A raw bundle of 4-bit indices with its picture twice as wide, the right half black.
@@ -51,7 +36,7 @@ fn wider(four: &[u8]) -> Vec<u8> {
     let texels = twice(atlas.texels, 1 << atlas.width_log2 >> 1);
     let mask = bundle.sections().find(|section| section.tag == MASK).map(|section| twice(section.bytes, 1 << atlas.width_log2 >> 3));
     let bytes = with_atlas(four, &Atlas { width_log2: atlas.width_log2 + 1, texels: &texels, ..atlas });
-    mask.map_or(bytes.clone(), |mask| with_section(&bytes, MASK, &mask))
+    mask.map_or(bytes.clone(), |mask| tamper::with_section(&bytes, MASK, &mask).expect("there is a mask"))
 }
 
 /// A raw bundle of 4-bit indices, retold in 8 bits and in colours.
@@ -69,23 +54,7 @@ fn retold(four: &[u8]) -> [Vec<u8>; 2] {
 
 /// Some frames as a player of `T` draws them, plain and antialiased, from memory filled with `fill`.
 fn pixels<T: Texels>(bytes: &[u8], fill: u8, order: ByteOrder) -> Vec<u16> {
-    let bundle = Bundle::parse(bytes).expect("sound");
-    let mut memory = vec![fill; bundle.memory_needed()];
-    let mut player = Player::<T>::with_texels(&bundle, &mut memory).expect("the memory it asked for");
-    player.set_byte_order(order);
-    let mut out = Vec::new();
-    for frame in [0, 5, 6, 11, 2] {
-        player.seek(Frame(frame));
-        for y in 0..SIZE[1] {
-            // One row is shorter than the screen.
-            let mut row = vec![0; if y == 7 { 61 } else { SIZE[0] as usize }];
-            player.row(y, &mut row);
-            out.extend(&row);
-            player.smooth_row(y, &mut row);
-            out.extend(&row);
-        }
-    }
-    out
+    play::both_ways::<T>(bytes, &[0, 5, 6, 11, 2], fill, order).expect("sound, and the memory it asked for")
 }
 
 #[test]

@@ -131,6 +131,14 @@ pub struct SourceImage {
     pub labels: Vec<Label>,
 }
 
+impl SourceImage {
+    /// The colour of a texel; black for one that the palette has no entry for.
+    #[must_use]
+    pub fn colour(&self, texel: u16) -> [u8; 3] {
+        self.palette.get(usize::from(texel)).copied().unwrap_or_default()
+    }
+}
+
 /// What the reports say about the source image.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Figures {

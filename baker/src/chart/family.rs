@@ -5,6 +5,7 @@ use super::merge::Weights;
 use super::observe::Face;
 use super::view::View;
 use super::{directions, sight};
+use crate::metrics;
 use crate::scene::Scene;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -93,7 +94,7 @@ impl Trial {
     /// Quality less what it costs, dB.
     #[must_use]
     pub fn worth(&self) -> f64 {
-        self.psnr - DOUBLE * libm::log2(self.bytes.max(1) as f64)
+        metrics::worth(self.psnr, self.bytes, DOUBLE)
     }
 }
 
@@ -114,20 +115,20 @@ impl From<Family> for Choice {
 
 impl Choice {
     /// What was tried.
-    pub fn tried(&self) -> impl Iterator<Item = &Trial> {
+    pub fn tried(&self) -> impl Iterator<Item = &Trial> + Clone {
         self.trials.iter().flatten()
     }
+}
 
-    /// The choice and its reasons in words: "charts: sight (29.3 dB, 41 kB; planes: 29.1 dB, 48 kB)".
-    #[must_use]
-    pub fn reason(&self) -> String {
-        let figures = |trial: &Trial| format!("{:.1} dB, {} kB", trial.psnr, trial.bytes.div_ceil(1000));
-        let own = self.tried().filter(|t| t.family == self.family).map(figures);
-        let others = self.tried().filter(|t| t.family != self.family).map(|t| format!("{}: {}", t.family.name(), figures(t)));
-        let reasons: Vec<String> = own.chain(others).collect();
-        let reasons = if reasons.is_empty() { String::new() } else { format!(" ({})", reasons.join("; ")) };
-        format!("charts: {}{reasons}", self.family.name())
-    }
+/// A choice and its reasons in words: "charts: sight (29.3 dB, 41 kB; planes: 29.1 dB, 48 kB)".
+#[must_use]
+pub fn reason<'t>(family: Family, tried: impl Iterator<Item = &'t Trial> + Clone) -> String {
+    let figures = |trial: &Trial| format!("{:.1} dB, {} kB", trial.psnr, trial.bytes.div_ceil(1000));
+    let own = tried.clone().filter(|t| t.family == family).map(figures);
+    let others = tried.filter(|t| t.family != family).map(|t| format!("{}: {}", t.family.name(), figures(t)));
+    let reasons: Vec<String> = own.chain(others).collect();
+    let reasons = if reasons.is_empty() { String::new() } else { format!(" ({})", reasons.join("; ")) };
+    format!("charts: {}{reasons}", family.name())
 }
 
 #[cfg(test)]
@@ -141,7 +142,7 @@ mod tests {
         let choice = Choice { family: Family::Sight, trials };
         let worth: Vec<f64> = choice.tried().map(Trial::worth).collect();
         assert!(worth[1] > worth[0], "half the bytes are worth more than one dB");
-        assert_eq!(choice.reason(), "charts: sight (29.0 dB, 25 kB; planes: 30.0 dB, 50 kB)");
-        assert_eq!(Choice::from(Family::Own).reason(), "charts: own");
+        assert_eq!(reason(choice.family, choice.tried()), "charts: sight (29.0 dB, 25 kB; planes: 30.0 dB, 50 kB)");
+        assert_eq!(reason(Family::Own, Choice::from(Family::Own).tried()), "charts: own");
     }
 }

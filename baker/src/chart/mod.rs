@@ -21,7 +21,7 @@ use crate::scene::Scene;
 use glam::DVec3;
 use view::View;
 
-pub use family::{Choice, Family, Trial};
+pub use family::{Choice, Family, Trial, reason};
 pub use labels::assign;
 pub(crate) use observe::Faces;
 

@@ -26,7 +26,7 @@ const DOT: u32 = 3;
 pub fn never_seen(image: &SourceImage, never: &[bool]) -> Picture {
     let texel = |i: usize| match (never[i], image.covered[i]) {
         (true, _) => NEVER,
-        (false, true) => image.palette.get(usize::from(image.texels[i])).copied().unwrap_or_default().map(|v| v / 2),
+        (false, true) => image.colour(image.texels[i]).map(|v| v / 2),
         (false, false) => [0; 3],
     };
     Picture::enlarged(&(0..image.texels.len()).map(texel).collect::<Vec<_>>(), image.width)

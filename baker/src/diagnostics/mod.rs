@@ -94,7 +94,7 @@ fn bordered(image: &SourceImage) -> Vec<u8> {
         .iter()
         .zip(&image.covered)
         .map(|(&texel, &covered)| {
-            let colour = image.palette.get(usize::from(texel)).copied().unwrap_or_default();
+            let colour = image.colour(texel);
             if covered { colour } else { colour.map(|v| v / 2) }
         })
         .collect();

@@ -23,10 +23,7 @@ pub fn draw(flat: &Flat, frame: u32, cell: u32) -> Picture {
     let (image, gbuffer) = (&flat.atlas.image, &flat.atlas.gbuffer);
     let (width, height, cell) = (gbuffer.width as usize, gbuffer.height as usize, cell.max(1) as usize);
     let first = frame as usize * width * height;
-    let dimmed = |&texel: &u16| {
-        let colour = image.palette.get(usize::from(texel)).copied().unwrap_or_default();
-        colour.map(|v| (u16::from(v) * DIM / 256) as u8)
-    };
+    let dimmed = |&texel: &u16| image.colour(texel).map(|v| (u16::from(v) * DIM / 256) as u8);
     let mut picture = Picture::enlarged(&image.texels.iter().map(dimmed).collect::<Vec<_>>(), image.width);
     let scale = SIDE / image.width;
     let place = |pixel: usize| gbuffer.uv[pixel].map(|v| v * scale as f32);
