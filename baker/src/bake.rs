@@ -12,6 +12,7 @@ use crate::scene::Scene;
 use crate::sheets::{self, KeyGrid, Layers};
 use crate::trace::Tracer;
 use crate::verify::VerifyError;
+use crate::walls;
 use crate::{fields, fit, order, polish, spare, tears, timing};
 use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC};
 use std::time::Instant;
@@ -148,6 +149,8 @@ pub struct Flat {
     pub seams: Vec<u8>,
     /// The flat ones among the labels.
     pub planes: Vec<Option<FlatChart>>,
+    /// The frames after which the camera goes through a surface.
+    pub crossed: Vec<u32>,
     /// Rays cast.
     pub rays: u64,
     /// Seconds the rays took.
@@ -199,7 +202,17 @@ pub(crate) fn flatten_hits(
     let tears = tears::find(scene, tracer, hits, &atlas.gbuffer);
     let seams = causes::seams(scene, hits, &atlas.gbuffer);
     let planes = planes::find(scene, hits, &atlas.gbuffer, atlas.image.labels.len());
-    Ok(Flat { tears, seams, planes, rays: hits.samples.len() as u64, atlas, ray_seconds, atlas_seconds: start.elapsed().as_secs_f64() })
+    let crossed = walls::crossed(scene, tracer);
+    Ok(Flat {
+        tears,
+        seams,
+        planes,
+        crossed,
+        rays: hits.samples.len() as u64,
+        atlas,
+        ray_seconds,
+        atlas_seconds: start.elapsed().as_secs_f64(),
+    })
 }
 
 /// How much of `total` is done, 0..=1.

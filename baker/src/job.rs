@@ -5,6 +5,7 @@ use crate::atlas::{self, Storage};
 use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings};
 use crate::chart::{self, Choice, Family};
 use crate::choose;
+use crate::finer;
 use crate::inspect::Inspection;
 use crate::report::{Origin, Report, Seconds};
 use crate::scene::Scene;
@@ -178,7 +179,10 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
             let flat = bake::flatten(scene, &settings.atlas, progress)?;
             something_seen(&flat)?;
             let encoded = bake::encode(scene, &flat, &settings, progress)?;
-            Chosen { flat, encoded, settings, search_seconds: 0.0, warnings: Vec::new() }
+            let free = options.cell.is_none() && options.key_interval.is_none();
+            let (settings, encoded, warnings) =
+                if free { finer::choose(scene, &flat, settings, encoded, progress)? } else { (settings, encoded, Vec::new()) };
+            Chosen { flat, encoded, settings, search_seconds: 0.0, warnings }
         }
         goal => tune::search(scene, options, goal, progress)?,
     };

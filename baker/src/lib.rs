@@ -12,6 +12,7 @@ pub mod choose;
 pub mod encode;
 pub mod fields;
 pub mod files;
+mod finer;
 pub mod fit;
 pub mod folds;
 pub mod gbuffer;
@@ -36,6 +37,7 @@ pub mod trace;
 pub mod truth;
 pub mod tune;
 pub mod verify;
+mod walls;
 
 pub use job::{Goal, Options, TruthFrames, bake_scene};
 pub use report::Report;

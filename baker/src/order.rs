@@ -1,6 +1,6 @@
-//! Order: the sheets of every torn cell, front to back, and the coverage test of each, such that the player shows the
-//! right sheet at as many pixels as can be. Positions come from `fit`, fields from `fields`; the ordered lists go
-//! to `encode`.
+//! Order: the sheets of every torn cell, front to back, and the coverage test of each, such that what the player shows differs least from
+//! what is seen. A wrong sheet of nearly the right colour does little harm: of two orders that get as many pixels wrong, the one that shows
+//! it less is better. Positions come from `fit`, fields from `fields`; the ordered lists go to `encode`.
 
 use crate::atlas::SourceImage;
 use crate::bake::Coverage;
@@ -12,9 +12,19 @@ use crate::sheets::{KeyGrid, Layers, Sheets};
 use cubist_core::format::{MAX_SHEETS, SPACE_LINEAR, TIME_LINEAR};
 use cubist_core::lists::{BOTH, CHART, FIELD};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// Up to this many sheets every order is tried; more are ordered greedily, front to back.
 const EXHAUSTIVE: usize = 5;
+
+/// What a pixel costs that shows the wrong sheet in the right colour, in parts of one that is plainly wrong.
+const HIDDEN: u32 = 64;
+/// The units of [`Cost`] in a pixel that is plainly wrong.
+const PIXEL: u32 = 256;
+/// The squared difference of such a pixel's colours, the sum of three channels: forty levels each.
+const PLAIN: u32 = 3 * 40 * 40;
+/// No pixel costs more than this many plainly wrong ones.
+const MOST: u32 = 4;
 
 /// What the sheets are ordered by.
 pub struct Evidence<'a> {
@@ -36,13 +46,16 @@ pub struct Evidence<'a> {
     pub coverage: Coverage,
 }
 
-/// A test that a sheet may have, and what it costs, pixels.
-type Candidate = (u16, u32);
+/// What shows wrong, in parts of [`PIXEL`].
+type Cost = u64;
+
+/// A test that a sheet may have, and what it costs.
+type Candidate = (u16, Cost);
 
 impl Evidence<'_> {
     /// The tests to choose from: before the fields are known only the chart's.
     fn candidates(&self) -> Vec<Candidate> {
-        let price = self.field_price;
+        let price = Cost::from(self.field_price * PIXEL);
         match (self.fields, self.coverage) {
             (None, _) | (_, Coverage::Chart) => vec![(CHART, 0)],
             (_, Coverage::Field) => vec![(FIELD, price)],
@@ -53,12 +66,16 @@ impl Evidence<'_> {
 
 /// Pixels of a torn cell that see the same.
 struct Group {
-    /// The sheet that should show.
+    /// The sheet that should show; [`NO_SHEET`] where it was left out.
     sheet: usize,
     /// The sheets whose chart covers the pixel, one bit each, and from bit 16 on those whose fields do.
     covering: u32,
-    pixels: u32,
+    /// What it costs to show each sheet.
+    cost: [Cost; MAX_SHEETS],
 }
+
+/// The sheet of a pixel whose own was left out.
+const NO_SHEET: usize = MAX_SHEETS;
 
 impl Group {
     fn covers(&self, sheet: usize, test: u16) -> bool {
@@ -71,47 +88,35 @@ impl Group {
     }
 }
 
-/// An order with its tests, and the pixels it gets wrong.
+/// An order with its tests.
 struct Choice {
     order: Vec<usize>,
     tests: u16,
-    wrong: u32,
-    /// Wrong pixels plus what the fields cost.
-    cost: u32,
+    /// What shows wrong, plus what the fields cost.
+    cost: Cost,
 }
 
-/// Sorts the sheets of every cell front to back and chooses their tests. Returns the pixels at which
-/// another sheet than the right one will show.
-pub fn sort(evidence: &Evidence<'_>, sheets: &mut Sheets) -> u64 {
+/// Sorts the sheets of every cell front to back and chooses their tests.
+pub fn sort(evidence: &Evidence<'_>, sheets: &mut Sheets) {
     let candidates = &evidence.candidates();
-    let wrong: Vec<u64> = sheets
-        .lists
-        .par_iter_mut()
-        .zip(&mut sheets.tests)
-        .enumerate()
-        .map(|(index, (list, tests))| {
-            if list.len() < 2 {
-                return 0;
-            }
-            let groups = observe(evidence, index, list);
-            let choose = if list.len() <= EXHAUSTIVE { best } else { greedy };
-            let choice = choose(&groups, list.len(), candidates);
-            *list = choice.order.iter().map(|&sheet| list[sheet]).collect();
-            *tests = choice.tests;
-            u64::from(choice.wrong)
-        })
-        .collect();
-    wrong.iter().sum()
+    let torn = sheets.lists.par_iter_mut().zip(&mut sheets.tests).enumerate().filter(|(_, (list, _))| list.len() > 1);
+    torn.for_each(|(index, (list, tests))| {
+        let groups = observe(evidence, index, list);
+        let choose = if list.len() <= EXHAUSTIVE { best } else { greedy };
+        let choice = choose(&groups, list.len(), candidates);
+        *list = choice.order.iter().map(|&sheet| list[sheet]).collect();
+        *tests = choice.tests;
+    });
 }
 
-/// Counts the pixels of a cell and interval by what they see and what would cover them.
+/// Sums up the pixels of a cell and interval by what they see and what would cover them.
 fn observe(evidence: &Evidence<'_>, index: usize, list: &[u8]) -> Vec<Group> {
     let &Evidence { gbuffer, grid, image, layers, fit, fields, .. } = evidence;
     let cells = grid.grid.cells();
     let (interval, cell) = (index / cells, index % cells);
     let patches = |ways| -> Vec<Patch> { list.iter().map(|&label| Patch::new(grid, layers, [interval, cell], label, ways)).collect() };
     let (position_patches, field_patches) = (patches([grid.time, grid.space]), patches([TIME_LINEAR, SPACE_LINEAR]));
-    let mut seen: Vec<u64> = Vec::new();
+    let mut seen: BTreeMap<(usize, u32), [Cost; MAX_SHEETS]> = BTreeMap::new();
     for frame in grid.frames_of(interval) {
         let weights = grid.weights(interval, frame, grid.time);
         let linear = grid.weights(interval, frame, TIME_LINEAR);
@@ -121,25 +126,42 @@ fn observe(evidence: &Evidence<'_>, index: usize, list: &[u8]) -> Vec<Group> {
         let positions = points(&position_patches, &fit.uv, &weights);
         let distances = fields.map(|fields| points(&field_patches, &fields.distance, &linear));
         grid.each_pixel(frame, cell, |pixel, at| {
-            let Some(sheet) = list.iter().position(|&label| u16::from(label) == gbuffer.label[pixel]) else { return };
+            let sheet = list.iter().position(|&label| u16::from(label) == gbuffer.label[pixel]).unwrap_or(NO_SHEET);
+            let right = colour(image, gbuffer.uv[pixel]);
+            let mut costs = [0; MAX_SHEETS];
             let around = patch::around(at);
             let mix = |points: &AtPoints| patch::value(points, around);
             let mut covering = 0u32;
             for (place, &label) in list.iter().enumerate() {
-                covering |= u32::from(covers(image, label, mix(&positions[place]))) << place;
+                let uv = mix(&positions[place]);
+                covering |= u32::from(covers(image, label, uv)) << place;
+                if place != sheet {
+                    costs[place] = cost(right, colour(image, uv));
+                }
                 if let Some((fields, distances)) = fields.zip(distances.as_ref()) {
                     let [a, b]: [f32; 2] = mix(&distances[place]);
                     let inside = a > 0.0 && (!fields.strip(label) || b > 0.0);
                     covering |= u32::from(inside) << (16 + place);
                 }
             }
-            seen.push((sheet as u64) << 32 | u64::from(covering));
+            let sums = seen.entry((sheet, covering)).or_default();
+            sums.iter_mut().zip(costs).for_each(|(sum, cost)| *sum += Cost::from(cost));
         });
     }
-    seen.sort_unstable();
-    seen.chunk_by(|a, b| a == b)
-        .map(|run| Group { sheet: (run[0] >> 32) as usize, covering: run[0] as u32, pixels: run.len() as u32 })
-        .collect()
+    seen.into_iter().map(|((sheet, covering), cost)| Group { sheet, covering, cost }).collect()
+}
+
+/// The colour of the texel at a position, or of the nearest there is.
+fn colour(image: &SourceImage, [u, v]: [f32; 2]) -> [u8; 3] {
+    let (x, y) = ((u.max(0.0) as u32).min(image.width - 1), (v.max(0.0) as u32).min(image.height - 1));
+    image.colour(image.texels[(y * image.width + x) as usize])
+}
+
+/// What it costs to show a colour of a wrong sheet.
+fn cost(right: [u8; 3], shown: [u8; 3]) -> u32 {
+    let square = |k: usize| u32::from(right[k].abs_diff(shown[k])).pow(2);
+    let off = square(0) + square(1) + square(2);
+    (HIDDEN + (PIXEL - HIDDEN) * off / PLAIN).min(MOST * PIXEL)
 }
 
 /// The player's chart test.
@@ -154,23 +176,38 @@ fn covers(image: &SourceImage, label: u8, [u, v]: [f32; 2]) -> bool {
 
 /// The tests and the cost of an order: each sheet's test is chosen of `candidates` in turn, front to back.
 fn weigh(groups: &[Group], order: &[usize], candidates: &[Candidate]) -> Choice {
-    let mut choice = Choice { order: order.to_vec(), tests: 0, wrong: 0, cost: 0 };
+    let mut choice = Choice { order: order.to_vec(), tests: 0, cost: 0 };
     let mut left: Vec<&Group> = groups.iter().collect();
     for (place, &sheet) in order[..order.len() - 1].iter().enumerate() {
-        let wrong = |test: u16| -> u32 { left.iter().filter(|g| g.covers(sheet, test) != (g.sheet == sheet)).map(|g| g.pixels).sum() };
-        let tried = candidates.iter().map(|&(test, price)| (wrong(test) + price, wrong(test), test));
-        let (cost, wrong, test) = tried.min_by_key(|&(cost, _, _)| cost).unwrap_or((0, 0, CHART));
+        let behind = &order[place + 1..];
+        let tried = candidates.iter().map(|&(test, price)| (price + wrong(&left, sheet, test, behind), price, test));
+        let (_, price, test) = tried.min_by_key(|&(cost, _, _)| cost).unwrap_or((0, 0, CHART));
         choice.tests |= test << (2 * place);
-        choice.wrong += wrong;
-        choice.cost += cost;
-        // What it covers is settled, and so is what it should have.
-        left.retain(|g| !g.covers(sheet, test) && g.sheet != sheet);
+        choice.cost += price;
+        // What it covers is settled.
+        left.retain(|group| {
+            let covered = group.covers(sheet, test);
+            choice.cost += if covered { group.cost[sheet] } else { 0 };
+            !covered
+        });
     }
     let back = order[order.len() - 1];
-    let wrong: u32 = left.iter().filter(|g| g.sheet != back).map(|g| g.pixels).sum();
-    choice.wrong += wrong;
-    choice.cost += wrong;
+    choice.cost += left.iter().map(|group| group.cost[back]).sum::<Cost>();
     choice
+}
+
+/// What a test of a sheet gets wrong: what it covers, and what it does not but should, which at best shows the least wrong of those `behind`.
+fn wrong(left: &[&Group], sheet: usize, test: u16, behind: &[usize]) -> Cost {
+    let of = |group: &&Group| {
+        if group.covers(sheet, test) {
+            group.cost[sheet]
+        } else if group.sheet == sheet || group.sheet == NO_SHEET {
+            behind.iter().map(|&other| group.cost[other]).min().unwrap_or(0)
+        } else {
+            0
+        }
+    };
+    left.iter().map(of).sum()
 }
 
 /// The order with the least cost; of equal ones the first in lexical order.
@@ -201,14 +238,15 @@ fn greedy(groups: &[Group], count: usize, candidates: &[Candidate]) -> Choice {
     let mut order = Vec::with_capacity(count);
     let mut left: Vec<&Group> = groups.iter().collect();
     while !rest.is_empty() {
-        let wrong = |sheet: usize, test: u16| -> u32 {
-            left.iter().filter(|g| g.covers(sheet, test) != (g.sheet == sheet)).map(|g| g.pixels).sum()
+        let tried = (0..rest.len()).flat_map(|at| candidates.iter().map(move |&(test, _)| (at, test)));
+        let cost = |&(at, test): &(usize, u16)| {
+            let behind: Vec<usize> = rest.iter().copied().filter(|&other| other != rest[at]).collect();
+            wrong(&left, rest[at], test, &behind)
         };
-        let tried = rest.iter().enumerate().flat_map(|(at, &sheet)| candidates.iter().map(move |&(test, _)| (at, sheet, test)));
-        let Some((at, sheet, test)) = tried.min_by_key(|&(_, sheet, test)| wrong(sheet, test)) else { break };
-        rest.remove(at);
+        let Some((at, test)) = tried.min_by_key(cost) else { break };
+        let sheet = rest.remove(at);
         order.push(sheet);
-        left.retain(|g| !g.covers(sheet, test) && g.sheet != sheet);
+        left.retain(|group| !group.covers(sheet, test));
     }
     weigh(groups, &order, candidates)
 }
@@ -227,24 +265,43 @@ mod tests {
         assert_eq!((count, order), (24, vec![3, 2, 1, 0]));
     }
 
+    /// So many pixels of a sheet, all plainly wrong where another one shows.
+    fn group(sheet: usize, covering: u32, pixels: u32) -> Group {
+        let mut cost = [Cost::from(pixels * PIXEL); MAX_SHEETS];
+        cost[sheet] = 0;
+        Group { sheet, covering, cost }
+    }
+
     #[test]
     fn the_sheet_that_covers_everything_goes_to_the_back() {
-        let groups = [Group { sheet: 0, covering: 0b01, pixels: 10 }, Group { sheet: 1, covering: 0b11, pixels: 5 }];
+        let groups = [group(0, 0b01, 10), group(1, 0b11, 5)];
         for choice in [best(&groups, 2, &[(CHART, 0)]), greedy(&groups, 2, &[(CHART, 0)])] {
-            assert_eq!((choice.order, choice.tests, choice.wrong), (vec![1, 0], CHART, 0));
+            assert_eq!((choice.order, choice.tests, choice.cost), (vec![1, 0], CHART, 0));
         }
     }
 
     #[test]
     fn a_field_is_used_where_charts_cannot_tell() {
         // Both charts cover everything; the field of the first tells.
-        let groups = [Group { sheet: 0, covering: 0x1_0003, pixels: 30 }, Group { sheet: 1, covering: 0b11, pixels: 20 }];
-        let all = |price: u32| [(CHART, 0), (FIELD, price), (BOTH, price)];
+        let groups = [group(0, 0x1_0003, 30), group(1, 0b11, 20)];
+        let price = |pixels: u32| Cost::from(pixels * PIXEL);
+        let all = |pixels: u32| [(CHART, 0), (FIELD, price(pixels)), (BOTH, price(pixels))];
         let choice = best(&groups, 2, &all(4));
-        assert_eq!((choice.order, choice.tests, choice.wrong, choice.cost), (vec![0, 1], FIELD, 0, 4));
+        assert_eq!((choice.order, choice.tests, choice.cost), (vec![0, 1], FIELD, price(4)));
         // Not where it costs more than it saves.
         assert_eq!(best(&groups, 2, &all(50)).tests, CHART);
         // Unless there is nothing else to choose.
-        assert_eq!(best(&groups, 2, &[(FIELD, 50)]).tests, FIELD);
+        assert_eq!(best(&groups, 2, &[(FIELD, price(50))]).tests, FIELD);
+    }
+
+    #[test]
+    fn what_shows_less_wrong_is_preferred() {
+        // Two sheets that cover everything: the one seen more would win, were it not of nearly the same colour as the other is there.
+        let (most, least) = (group(0, 0b11, 30), group(1, 0b11, 20));
+        assert_eq!(best(&[most, least], 2, &[(CHART, 0)]).order[0], 0);
+        let mut most = group(0, 0b11, 30);
+        most.cost[1] /= 2;
+        assert_eq!(best(&[most, group(1, 0b11, 20)], 2, &[(CHART, 0)]).order[0], 1);
+        assert!(cost([10, 20, 30], [11, 20, 30]) < PIXEL / 2 && cost([0; 3], [255; 3]) == MOST * PIXEL);
     }
 }

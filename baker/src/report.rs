@@ -274,6 +274,13 @@ fn warnings(origin: &Origin<'_>) -> Vec<String> {
             figures.labels - 1
         ));
     }
+    if let [first, rest @ ..] = flat.crossed.as_slice() {
+        let more = if rest.is_empty() { String::new() } else { format!(", and {} more times", rest.len()) };
+        out.push(format!(
+            "the camera goes through a surface between frames {first} and {}{more}: what is behind it shows all at once; move the path around it",
+            first + 1
+        ));
+    }
     if scene.playback.looping && scene.playback.frames == 1 {
         out.push("a looping path of one frame shows a single picture".to_owned());
     }

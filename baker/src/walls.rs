@@ -1,0 +1,66 @@
+//! Walls: where the camera goes through a surface on its way from frame to frame. Paths come with the scene, hits from the tracer; the report warns.
+
+use crate::gbuffer::Lens;
+use crate::scene::Scene;
+use crate::trace::Tracer;
+
+/// Steps that a frame's way is cut into: paths bend.
+const STEPS: u32 = 4;
+/// A step longer than this many middling ones is a cut to another place, which may go through anything.
+const CUT: f64 = 20.0;
+
+/// The frames after which the camera goes through a surface before the next one is shown.
+#[must_use]
+pub fn crossed(scene: &Scene, tracer: &Tracer<'_>) -> Vec<u32> {
+    let play = &scene.playback;
+    let last = if play.looping { play.frames } else { play.frames.saturating_sub(1) };
+    let eyes = |frame: u32| (0..=STEPS).map(move |step| Lens::at(scene, f64::from(frame) + f64::from(step) / f64::from(STEPS)).eye);
+    let length = |frame: u32| Lens::new(scene, frame).eye.distance(Lens::at(scene, f64::from(frame) + 1.0).eye);
+    let mut lengths: Vec<f64> = (0..last).map(length).collect();
+    let ways = lengths.clone();
+    lengths.sort_by(f64::total_cmp);
+    let longest = CUT * lengths.get(lengths.len() / 2).copied().unwrap_or(0.0);
+    let through = |frame: u32| {
+        eyes(frame).zip(eyes(frame).skip(1)).any(|(from, to)| {
+            let way = to - from;
+            let far = way.length();
+            far > 0.0 && tracer.hit(from, way / far).is_some_and(|hit| hit.t < far)
+        })
+    };
+    (0..last).filter(|&frame| ways[frame as usize] <= longest && through(frame)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::camera::{Path, Pose};
+    use crate::scene::builtin;
+    use glam::DVec3;
+    use std::sync::Arc;
+
+    /// Straight on along x, looking along x.
+    struct Straight([f64; 2], f64);
+
+    impl Path for Straight {
+        fn pose(&self, s: f64) -> Pose {
+            let eye = DVec3::new(self.0[0] + (self.0[1] - self.0[0]) * s, self.1, 0.03);
+            Pose::look_at(eye, eye + DVec3::X, DVec3::Y, 60.0)
+        }
+    }
+
+    fn along(ends: [f64; 2], height: f64) -> Vec<u32> {
+        let mut scene = builtin::build("pyramid").unwrap();
+        (scene.playback.frames, scene.playback.looping) = (11, false);
+        scene.camera = Arc::new(Straight(ends, height));
+        crossed(&scene, &Tracer::new(&scene))
+    }
+
+    #[test]
+    fn a_path_through_a_solid_is_told() {
+        // In through one side, out through the opposite one: its foot is 1.7 from the middle, and it is 2.3 high.
+        let through = along([-4.0, 4.0], 0.7);
+        assert!(through.len() == 2 && through[0] < 5 && through[1] >= 5, "{through:?}");
+        assert!(along([-4.0, 4.0], 2.5).is_empty(), "above it");
+        assert!(along([2.0, 6.0], 0.7).is_empty(), "beside it");
+    }
+}
