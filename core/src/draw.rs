@@ -229,7 +229,8 @@ fn block<P: Paint, const EIGHT: bool>(
     while sheets != 0 && left != 0 {
         let place = usize::from(mixed.sheet).wrapping_add(sheets.trailing_zeros() as usize);
         sheets &= sheets.wrapping_sub(1);
-        let Some(sheet) = site.sheets.sheet.get(place) else { break };
+        let Some(sheet) = site.sheets.sheet.get(place).map(|sheet| sheet.further(mixed.along)) else { break };
+        let sheet = &sheet;
         let mut shown = left;
         // The last one covers what is left.
         let tested = sheets != 0;

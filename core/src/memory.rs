@@ -11,8 +11,8 @@ use crate::nodes;
 use crate::pack::{self, Picture, Recent, Scratch};
 use crate::plan::{Edge, Mixed, Plan, Run};
 use crate::record::Stream;
-use crate::row::{Layer, NodeRow};
-use crate::sheet::{RowSheets, Sheet};
+use crate::row::{Chain, Collected, Layer, NodeRow};
+use crate::sheet::{RowSheets, Sheet, Stretch};
 use bytemuck::Pod;
 
 /// The caller's memory, cut up.
@@ -29,6 +29,8 @@ pub struct Workspace<'m> {
     pub rows: [NodeRow<'m>; 4],
     /// Where space is cubic, what lies halfway down the row of cells.
     pub halfway: NodeRow<'m>,
+    /// What is put together of a row of nodes.
+    pub collected: Collected<'m>,
     /// The sheets of the current row of cells.
     pub sheets: RowSheets<'m>,
     /// What the current strip of it shows.
@@ -104,10 +106,10 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, texture: Texture<'m>) -
     let node_row = |cutter: &mut Cutter<'m>, wanted: bool, fields: bool| {
         let if_wanted = |count: usize| if wanted { count } else { 0 };
         NodeRow {
-            start: cutter.take(if_wanted(one_more(grid.node_columns()))),
-            label: cutter.take(if_wanted(row_layers)),
+            chain: cutter.take::<Chain>(if_wanted(row_layers)),
+            chains: 0,
+            head: cutter.take(if_wanted(bundle.label_count())),
             layer: cutter.take::<Layer>(if_wanted(row_layers)),
-            right: cutter.take(if_wanted(row_layers)),
             middle: cutter.take::<Layer>(if cubic { if_wanted(row_layers) } else { 0 }),
             field: cutter.take::<[i16; 2]>(if fields { if_wanted(row_layers) } else { 0 }),
         }
@@ -141,7 +143,12 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, texture: Texture<'m>) -
         },
         rows: core::array::from_fn(|row| node_row(cutter, cubic || row == 1 || row == 2, fields > 0)),
         halfway: node_row(cutter, cubic, false),
-        sheets: RowSheets { start: cutter.take(one_more(grid.columns)), sheet: cutter.take::<Sheet>(row_sheets) },
+        collected: Collected {
+            piece: cutter.take::<[u16; 2]>(row_layers),
+            layer: cutter.take::<Layer>(row_layers),
+            field: cutter.take::<[i16; 2]>(if fields > 0 { row_layers } else { 0 }),
+        },
+        sheets: RowSheets { stretch: cutter.take::<Stretch>(grid.columns), stretches: 0, sheet: cutter.take::<Sheet>(row_sheets) },
         plan: Plan {
             // Runs of one block each would have two edges a block.
             edge: cutter.take::<Edge>(blocks.saturating_mul(2)),

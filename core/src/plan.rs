@@ -10,8 +10,8 @@ use crate::coverage::{Chart, Cover};
 use crate::fixed::PlayUv;
 use crate::format::{MAX_SHEETS, SPACE_CUBIC, STRIP};
 use crate::lists::{CHART, FIELD};
-use crate::row::Layer;
-use crate::sheet::{Block, Corners, RowSheets, Rows, Sheet};
+use crate::row::{Layer, NodeRow};
+use crate::sheet::{Block, Corners, RowSheets, Rows, Sheet, Stretch};
 
 /// A side of a block in a run, in caller's memory: where it stands at the strip's current row, and how far that is from row to row.
 /// u counts the picture's width as 2^32, v its window's rows as 2^31.
@@ -60,8 +60,10 @@ pub struct Run {
 pub struct Mixed {
     /// The block, from the left.
     pub block: u16,
-    /// Its cell's first sheet.
+    /// Its stretch of cells' first sheet,
     pub sheet: u16,
+    /// and which of those cells it is in.
+    pub along: u16,
     /// Which of the cell's sheets it can show, a bit each; the last of them covers what is left.
     pub sheets: u16,
 }
@@ -176,15 +178,12 @@ impl Site<'_, '_, '_> {
         Block { rows: self.rows, quarter: Some([block & 1 == 1, strip & 1 == 1]) }
     }
 
-    /// What is above and below strip `strip` where space is cubic.
-    fn lines(&self, strip: u32) -> [Line<'_>; 2] {
-        let [top, halfway, bottom] = self.rows;
-        let first = (strip & 1) as usize;
-        let (upper, lower) = if first == 0 { (top, halfway) } else { (halfway, bottom) };
-        [
-            Line { layer: upper.layer, middle: upper.middle, place: first },
-            Line { layer: lower.layer, middle: lower.middle, place: first.wrapping_add(1) },
-        ]
+    /// What is above and below strip `strip` where space is cubic, from the corners of `sheet` on.
+    fn lines(&self, strip: u32, sheet: &Sheet) -> Option<[Line<'_>; 2]> {
+        let ([top, halfway, bottom], [a, b, c]) = (self.rows, sheet.nodes());
+        let lines = if strip & 1 == 0 { [(top, a), (halfway, b)] } else { [(halfway, b), (bottom, c)] };
+        let [above, below] = lines.map(|(row, from)| Line::new(row, from));
+        above.zip(below).map(|(above, below)| [above, below])
     }
 
     fn cubic(&self) -> bool {
@@ -204,16 +203,20 @@ impl Site<'_, '_, '_> {
 struct Line<'l> {
     layer: &'l [Layer],
     middle: &'l [Layer],
-    /// Which of a sheet's three rows this is.
-    place: usize,
 }
 
-impl Line<'_> {
-    /// A sheet's positions in the middle and at the right side of its cell.
+impl<'l> Line<'l> {
+    /// Part of a line, from layer `from` on.
+    fn new(row: &'l NodeRow<'_>, from: u16) -> Option<Self> {
+        let from = usize::from(from);
+        Some(Self { layer: row.layer.get(from.wrapping_add(1)..)?, middle: row.middle.get(from..)? })
+    }
+
+    /// The points in the middle and at the right side of cell after cell, from the `along`-th on.
     #[inline(always)]
-    fn points(&self, sheet: &Sheet) -> Option<[PlayUv; 2]> {
-        let [left, right] = sheet.nodes(self.place)?;
-        Some([self.middle.get(usize::from(left))?.uv(), self.layer.get(usize::from(right))?.uv()])
+    fn points(&self, along: usize) -> impl Iterator<Item = [PlayUv; 2]> + 'l {
+        let (middle, layer) = (self.middle.get(along..).unwrap_or(&[]), self.layer.get(along..).unwrap_or(&[]));
+        middle.iter().zip(layer).map(|(middle, layer)| [middle.uv(), layer.uv()])
     }
 }
 
@@ -227,104 +230,102 @@ impl Plan<'_> {
         let texture = site.bundle.texture();
         let window = Window::new(texture.width_log2, texture.height);
         let (log2, width) = (site.log2(), site.bundle.size().0);
-        let blocks = if site.cubic() { 2u32 } else { 1 };
-        let mut left = 0u32;
-        let mut block = 0u32;
-        let mut column = 0usize;
-        let lines = site.lines(strip);
-        while left < width {
-            let (first, sheets) = site.sheets.cell(column);
-            if let ([_], Some(window)) = (sheets, window)
-                && blocks == 2
-            {
-                // Most of most pictures.
-                let most = (width.saturating_sub(left) >> log2 >> 1) as usize;
-                // In pictures 512 wide, as most are; others go by `append` alone.
-                let cells = if window.width_log2 == 9 { self.extend::<9, 5>(column, most, site.sheets, lines, log2) } else { 0 };
-                if cells > 0 {
-                    let pixels = (cells as u32).wrapping_shl(log2).wrapping_mul(2);
-                    self.smooth = self.smooth.wrapping_add(pixels);
-                    (left, block) = (left.wrapping_add(pixels), block.wrapping_add(cells as u32).wrapping_add(cells as u32));
-                    column = column.wrapping_add(cells);
-                    continue;
-                }
+        let mut across = Across { site, window, strip, log2, width, left: 0, block: 0 };
+        for &stretch in site.sheets.stretches() {
+            match site.sheets.of(stretch) {
+                [sheet] => self.smooth(&mut across, stretch, sheet),
+                sheets => self.cell(&mut across, stretch, sheets),
             }
-            for _ in 0..blocks {
-                let pixels = width.saturating_sub(left).min(1 << log2);
-                let place = site.block(block, strip);
-                let shown = match sheets {
-                    [_] => 1,
-                    _ => candidates(site, &place, sheets),
-                };
-                let single = sheets.get(shown.trailing_zeros() as usize).filter(|_| shown.is_power_of_two());
-                let run = match (single, window) {
-                    (Some(sheet), Some(window)) => self.append(block as u16, sheet, place.corners(sheet), window, texture.height, log2),
-                    _ => false,
-                };
-                if !run {
-                    self.mix(Mixed { block: block as u16, sheet: first as u16, sheets: shown });
-                    self.tests = self.tests.wrapping_add(pixels.wrapping_mul(shown.count_ones().saturating_sub(1)));
-                }
-                let kind = if sheets.len() < 2 { &mut self.smooth } else { &mut self.torn };
-                *kind = kind.wrapping_add(pixels);
-                left = left.wrapping_add(pixels);
-                block = block.wrapping_add(1);
-            }
-            column = column.wrapping_add(1);
         }
     }
 
-    /// Appends smooth cells from `column` on to the last run, both blocks of each, as long as they follow it and fit into its window,
-    /// `most` at most; returns how many. WIDTH and ROWS are the window's.
+    /// Plans a stretch of cells that show one sheet.
+    fn smooth(&mut self, across: &mut Across<'_, '_, '_>, stretch: Stretch, sheet: &Sheet) {
+        let Across { site, window, strip, log2, width, .. } = *across;
+        let lines = if site.cubic() { site.lines(strip, sheet) } else { None };
+        let before = across.left;
+        let mut along = 0u16;
+        while along < stretch.cells && across.left < width {
+            // In pictures 512 wide, as most are; others go by `append` alone. Likewise the cell that the screen's edge cuts.
+            if let (Some(window @ Window { width_log2: 9, .. }), Some(lines)) = (window, lines) {
+                let most = (width.saturating_sub(across.left) >> log2 >> 1).min(stretch.cells.wrapping_sub(along).into());
+                let cells = self.extend(across.block, usize::from(along), most as usize, sheet.label(), lines, window, log2);
+                along = along.wrapping_add(cells);
+                across.block = across.block.wrapping_add(u32::from(cells).wrapping_mul(2));
+                across.left = across.block.wrapping_shl(log2);
+                if along == stretch.cells {
+                    break;
+                }
+            }
+            let here = sheet.further(along);
+            for _ in 0..across.blocks() {
+                let place = across.place();
+                if !self.append(across, &here, place.corners(&here)) {
+                    self.mix(Mixed { block: across.block as u16, sheet: stretch.sheet, along, sheets: 1 });
+                }
+                across.step();
+            }
+            along = along.wrapping_add(1);
+        }
+        self.smooth = self.smooth.wrapping_add(across.left.min(width).saturating_sub(before));
+    }
+
+    /// Plans a cell that shows several sheets, or none.
+    fn cell(&mut self, across: &mut Across<'_, '_, '_>, stretch: Stretch, sheets: &[Sheet]) {
+        let before = across.left;
+        for _ in 0..across.blocks() {
+            let place = across.place();
+            let shown = candidates(across.site, &place, sheets);
+            let single = sheets.get(shown.trailing_zeros() as usize).filter(|_| shown.is_power_of_two());
+            if !single.is_some_and(|sheet| self.append(across, sheet, place.corners(sheet))) {
+                self.mix(Mixed { block: across.block as u16, sheet: stretch.sheet, along: 0, sheets: shown });
+                let pixels = across.width.saturating_sub(across.left).min(1 << across.log2);
+                self.tests = self.tests.wrapping_add(pixels.wrapping_mul(shown.count_ones().saturating_sub(1)));
+            }
+            across.step();
+        }
+        let pixels = across.left.min(across.width).saturating_sub(before);
+        let kind = if sheets.is_empty() { &mut self.smooth } else { &mut self.torn };
+        *kind = kind.wrapping_add(pixels);
+    }
+
+    /// Appends smooth cells from the `along`-th of `lines` on, the first of which begins with block `block`, to the last run, both blocks of
+    /// each, as long as they follow it and fit into its window, `most` at most; returns how many.
     #[inline(never)]
-    fn extend<const WIDTH: u32, const ROWS: u32>(
-        &mut self,
-        column: usize,
-        most: usize,
-        sheets: &RowSheets<'_>,
-        [above, below]: [Line<'_>; 2],
-        log2: u32,
-    ) -> usize {
+    #[expect(clippy::too_many_arguments, reason = "the cells' place on the screen and in the rows of nodes are two")]
+    fn extend(&mut self, block: u32, along: usize, most: usize, label: u8, [above, below]: [Line<'_>; 2], window: Window, log2: u32) -> u16 {
         let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return 0 };
-        let block = column.wrapping_mul(2);
-        if usize::from(run.block).wrapping_add(usize::from(run.blocks)) != block {
+        if run.label != u16::from(label) || u32::from(run.block).wrapping_add(u32::from(run.blocks)) != block {
             return 0;
         }
-        let Some((&first, starts)) = sheets.start.get(column..).and_then(<[u16]>::split_first) else { return 0 };
-        let Some(listed) = sheets.sheet.get(usize::from(first)..) else { return 0 };
         let Some(edges) = self.edge.get_mut(self.edges..) else { return 0 };
-        let label = run.label as u8;
-        let window = Window { width_log2: WIDTH, rows_log2: ROWS };
+        // In known places the compiler counts better.
+        let window = Window { width_log2: 9, rows_log2: window.rows_log2 };
         let row = u32::from(run.row);
         let least = (row as i32).wrapping_shl(16).wrapping_add(MARGIN);
-        let [across, down] = [WIDTH, ROWS].map(|log2| 1u32.wrapping_shl(log2.wrapping_add(16)));
-        let inside = |uv: PlayUv| (uv.u.wrapping_sub(MARGIN) as u32) < across.wrapping_sub((2 * MARGIN) as u32);
-        let within = |uv: PlayUv| (uv.v.wrapping_sub(least) as u32) < down.wrapping_sub((2 * MARGIN) as u32);
+        let [across, down] = [window.width_log2, window.rows_log2].map(|log2| 1u32.wrapping_shl(log2.wrapping_add(16)));
+        let [wide, high] = [across, down].map(|size| size.wrapping_sub((2 * MARGIN) as u32));
+        let inside = |uv: PlayUv| (uv.u.wrapping_sub(MARGIN) as u32) < wide && (uv.v.wrapping_sub(least) as u32) < high;
+        // As in `append`: steps across of less than half the width, which is a power of two.
+        let near = |from: i32, to: PlayUv| (to.u.wrapping_sub(from).wrapping_add((across >> 1) as i32) as u32) < across;
         let [mut from, mut to] = self.last;
-        let mut next = first;
-        let mut done = 0usize;
-        for ((sheet, &start), [middle, right]) in listed.iter().zip(starts).zip(edges.as_chunks_mut::<2>().0).take(most) {
-            next = next.wrapping_add(1);
-            if start != next || sheet.label() != label {
-                break;
-            }
-            let (Some([a, b]), Some([c, d])) = (above.points(sheet), below.points(sheet)) else { break };
-            if !(inside(a) && inside(b) && inside(c) && inside(d) && within(a) && within(b) && within(c) && within(d)) {
-                break;
-            }
-            // As in `append`: steps across of less than half the width, which is a power of two.
-            let step = |from: i32, to: i32| to.wrapping_sub(from).wrapping_add((across >> 1) as i32) as u32;
-            if step(from, a.u) | step(a.u, b.u) | step(to, c.u) | step(c.u, d.u) >= across {
+        let mut done = 0u16;
+        let points = above.points(along).zip(below.points(along)).take(most);
+        for (([a, b], [c, d]), [middle, right]) in points.zip(edges.as_chunks_mut::<2>().0) {
+            if !(inside(a) && inside(c) && near(from, a) && near(to, c)) {
                 break;
             }
             *middle = window.edge(a, c, row, log2);
+            if !(inside(b) && inside(d) && near(a.u, b) && near(c.u, d)) {
+                break;
+            }
             *right = window.edge(b, d, row, log2);
             (from, to) = (b.u, d.u);
             done = done.wrapping_add(1);
         }
         let blocks = done.wrapping_mul(2);
-        run.blocks = run.blocks.wrapping_add(blocks as u16);
-        self.edges = self.edges.wrapping_add(blocks);
+        run.blocks = run.blocks.wrapping_add(blocks);
+        self.edges = self.edges.wrapping_add(blocks.into());
         self.last = [from, to];
         done
     }
@@ -336,9 +337,11 @@ impl Plan<'_> {
         }
     }
 
-    /// Appends a block that shows one sheet to the last run, or begins another; false where its positions fit no window.
+    /// Appends the block at `across`, which shows one sheet, to the last run, or begins another; false where its positions fit no window.
     #[inline(never)]
-    fn append(&mut self, block: u16, sheet: &Sheet, corners: Corners, window: Window, height: u32, log2: u32) -> bool {
+    fn append(&mut self, across: &Across<'_, '_, '_>, sheet: &Sheet, corners: Corners) -> bool {
+        let Some(window) = across.window else { return false };
+        let (block, log2, height) = (across.block as u16, across.log2, across.site.texture.height);
         let [a, b, c, d] = corners;
         let width = 1i32.wrapping_shl(window.width_log2.wrapping_add(16));
         let inside = |x: i32, limit: i32| (x.wrapping_sub(MARGIN) as u32) < limit.wrapping_sub(2 * MARGIN) as u32;
@@ -396,6 +399,37 @@ impl Plan<'_> {
             }
         }
         self.row = row;
+    }
+}
+
+/// How far a strip is planned.
+#[derive(Clone, Copy, Debug)]
+struct Across<'s, 'a, 'm> {
+    site: &'s Site<'s, 'a, 'm>,
+    window: Option<Window>,
+    strip: u32,
+    log2: u32,
+    /// The screen's width, and pixels to the left of the next block.
+    width: u32,
+    left: u32,
+    /// The next block.
+    block: u32,
+}
+
+impl Across<'_, '_, '_> {
+    /// Blocks of a cell, from left to right.
+    fn blocks(&self) -> u32 {
+        if self.site.cubic() { 2 } else { 1 }
+    }
+
+    fn place(&self) -> Block<'_, '_> {
+        self.site.block(self.block, self.strip)
+    }
+
+    /// On to the next block.
+    fn step(&mut self) {
+        self.block = self.block.wrapping_add(1);
+        self.left = self.block.wrapping_shl(self.log2);
     }
 }
 

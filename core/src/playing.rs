@@ -255,25 +255,26 @@ impl<'a> Playing<'a> {
         let row = (y >> self.bundle.grid().log2) as usize;
         let inside = y < self.bundle.size().1;
         if inside && self.loaded != Some(row) {
-            self.load(row);
             self.space.plan.strip = None;
+            return self.load(row);
         }
         inside
     }
 
-    /// Interpolates the nodes around a row of cells and looks up its sheets.
-    fn load(&mut self, row: usize) {
+    /// Interpolates the nodes around a row of cells and looks up its sheets; false where the keys for it are not held, which does not happen.
+    #[inline(never)]
+    fn load(&mut self, row: usize) -> bool {
         let grid = self.bundle.grid();
         // How long ago the key at the start of the interval was decoded, and through it the others.
         let age = self.needed().ahead;
         let bundle = self.bundle;
         let from = self.moment.interval as isize;
-        let Workspace { stream, rows, halfway, sheets, .. } = &mut self.space;
+        let Workspace { stream, rows, halfway, collected, sheets, .. } = &mut self.space;
         let at = |offset: isize| {
             let inside = bundle.looping() || (0..bundle.key_count() as isize).contains(&from.wrapping_add(offset));
             stream.key(age.checked_add_signed(offset.wrapping_neg())?).filter(|_| inside)
         };
-        let Some((start, lists)) = stream.key(age).zip(stream.lists(age)) else { return };
+        let Some((start, lists)) = stream.key(age).zip(stream.lists(age)) else { return false };
         let cubic_time = format::reach(bundle.path().time).0 == 1;
         let around = Around {
             before: at(-1).filter(|_| cubic_time),
@@ -299,17 +300,18 @@ impl<'a> Playing<'a> {
         for (place, nodes) in rows.iter_mut().enumerate().skip(known) {
             // The second row of the four is the row of cells' upper edge; the outer two are for the middles alone.
             if cubic || place == 1 || place == 2 {
-                let layers = nodes.fill(grid, row.wrapping_add(place).checked_sub(1), &around, &self.moment);
+                let layers = nodes.fill(collected, grid, row.wrapping_add(place).checked_sub(1), &around, &self.moment);
                 self.work.layers = self.work.layers.wrapping_add(layers);
             }
         }
         let [before, top, bottom, after] = &*rows;
         if cubic {
-            let layers = halfway.between(grid.node_columns(), [before, top, bottom, after]);
+            let layers = halfway.between([before, top, bottom, after]);
             self.work.middles = self.work.middles.wrapping_add(layers);
         }
         sheets.fill(grid, row, lists, [top, halfway, bottom], cubic);
         self.loaded = Some(row);
+        true
     }
 
     /// Takes up `key`, which follows the last one or is independent, where it was left, or begins it.
