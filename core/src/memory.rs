@@ -11,7 +11,7 @@ use crate::nodes;
 use crate::pack::{self, Picture, Recent, Scratch};
 use crate::plan::{Edge, Mixed, Plan, Run};
 use crate::record::Stream;
-use crate::row::{Chain, Collected, Layer, NodeRow};
+use crate::row::{Chain, Layer, NodeRow, Piece};
 use crate::sheet::{RowSheets, Sheet, Stretch};
 use bytemuck::Pod;
 
@@ -29,8 +29,8 @@ pub struct Workspace<'m> {
     pub rows: [NodeRow<'m>; 4],
     /// Where space is cubic, what lies halfway down the row of cells.
     pub halfway: NodeRow<'m>,
-    /// What is put together of a row of nodes.
-    pub collected: Collected<'m>,
+    /// What a row of nodes is put together from.
+    pub pieces: &'m mut [Piece],
     /// The sheets of the current row of cells.
     pub sheets: RowSheets<'m>,
     /// What the current strip of it shows.
@@ -143,11 +143,7 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, texture: Texture<'m>) -
         },
         rows: core::array::from_fn(|row| node_row(cutter, cubic || row == 1 || row == 2, fields > 0)),
         halfway: node_row(cutter, cubic, false),
-        collected: Collected {
-            piece: cutter.take::<[u16; 2]>(row_layers),
-            layer: cutter.take::<Layer>(row_layers),
-            field: cutter.take::<[i16; 2]>(if fields > 0 { row_layers } else { 0 }),
-        },
+        pieces: cutter.take::<Piece>(row_layers),
         sheets: RowSheets { stretch: cutter.take::<Stretch>(grid.columns), stretches: 0, sheet: cutter.take::<Sheet>(row_sheets) },
         plan: Plan {
             // Runs of one block each would have two edges a block.

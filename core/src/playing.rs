@@ -269,7 +269,7 @@ impl<'a> Playing<'a> {
         let age = self.needed().ahead;
         let bundle = self.bundle;
         let from = self.moment.interval as isize;
-        let Workspace { stream, rows, halfway, collected, sheets, .. } = &mut self.space;
+        let Workspace { stream, rows, halfway, pieces, sheets, .. } = &mut self.space;
         let at = |offset: isize| {
             let inside = bundle.looping() || (0..bundle.key_count() as isize).contains(&from.wrapping_add(offset));
             stream.key(age.checked_add_signed(offset.wrapping_neg())?).filter(|_| inside)
@@ -300,7 +300,7 @@ impl<'a> Playing<'a> {
         for (place, nodes) in rows.iter_mut().enumerate().skip(known) {
             // The second row of the four is the row of cells' upper edge; the outer two are for the middles alone.
             if cubic || place == 1 || place == 2 {
-                let layers = nodes.fill(collected, grid, row.wrapping_add(place).checked_sub(1), &around, &self.moment);
+                let layers = nodes.fill(pieces, grid, row.wrapping_add(place).checked_sub(1), &around, &self.moment);
                 self.work.layers = self.work.layers.wrapping_add(layers);
             }
         }

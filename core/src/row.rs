@@ -35,77 +35,76 @@ impl Layer {
     }
 }
 
+/// No layer, no chain.
+const NONE: u16 = u16::MAX;
+
 /// Steps through the nodes of a key's row, from left to right.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 struct Walk<'w> {
     /// Where the layers of the nodes to come end.
     ends: &'w [u16],
     labels: &'w [u8],
-    uv: &'w [u32],
-    from: usize,
-    to: usize,
-    /// Where `seek` goes on.
-    next: usize,
+    /// The first layer of the node that `seek` has not passed, and where the node's end.
+    next: u16,
+    to: u16,
 }
 
 impl<'w> Walk<'w> {
     /// Over the `columns` nodes of `key` from node `first` on, before the first of them; over none without a key.
     fn new(key: Option<&'w Key<'_>>, first: usize, columns: usize) -> Self {
         let starts = key.and_then(|key| key.start.get(first..=first.wrapping_add(columns))?.split_first());
-        let (to, ends) = starts.map_or((0, &[][..]), |(&at, ends)| (usize::from(at), ends));
-        let (labels, uv) = key.map_or((&[][..], &[][..]), |key| (&*key.label, &*key.uv));
-        Self { ends, labels, uv, from: to, to, next: to }
+        let (to, ends) = starts.map_or((0, &[][..]), |(&at, ends)| (at, ends));
+        Self { ends, labels: key.map_or(&[], |key| &*key.label), next: to, to }
     }
 
     /// On to the next node; past the last there is one without layers.
     #[inline(always)]
     fn step(&mut self) {
-        self.from = self.to;
+        self.next = self.to;
         if let Some((&end, ends)) = self.ends.split_first() {
-            (self.to, self.ends) = (usize::from(end), ends);
+            (self.to, self.ends) = (end, ends);
         }
-        self.next = self.from;
     }
 
-    /// The index of the node's layer of `label`; labels are asked for in ascending order, as nodes have them.
+    /// The label that `seek` has come to.
     #[inline(always)]
-    fn seek(&mut self, label: u8) -> Option<usize> {
-        while self.next < self.to {
-            match self.labels.get(self.next) {
-                Some(&other) if other < label => self.next = self.next.wrapping_add(1),
-                Some(&other) if other == label => return Some(self.next),
-                _ => break,
+    fn label(&self) -> Option<u8> {
+        if self.next < self.to { self.labels.get(usize::from(self.next)).copied() } else { None }
+    }
+
+    /// The index of the node's layer of `label`, or [`NONE`]; labels are asked for in ascending order, as nodes have them.
+    #[inline(always)]
+    fn seek(&mut self, label: u8) -> u16 {
+        while let Some(other) = self.label() {
+            if other >= label {
+                return if other == label { self.next } else { NONE };
             }
+            self.next = self.next.wrapping_add(1);
         }
-        None
+        NONE
     }
 
     /// How many of the next `most` nodes carry a layer of `label` and nothing else, up to the first that does not.
-    #[inline(always)]
+    #[inline(never)]
     fn alone(&self, label: u8, most: usize) -> usize {
-        let labels = self.labels.get(self.to..).unwrap_or(&[]);
+        let labels = self.labels.get(usize::from(self.to)..).unwrap_or(&[]);
         let mut count = 0usize;
+        let mut to = self.to;
         for (&end, &other) in self.ends.iter().zip(labels).take(most) {
-            let next = count.wrapping_add(1);
-            if other != label || usize::from(end) != self.to.wrapping_add(next) {
+            to = to.wrapping_add(1);
+            if other != label || end != to {
                 break;
             }
-            count = next;
+            count = count.wrapping_add(1);
         }
         count
-    }
-
-    /// The positions of the next `nodes` nodes, which have one each.
-    #[inline(always)]
-    fn coming(&self, nodes: usize) -> &'w [u32] {
-        self.uv.get(self.to..self.to.wrapping_add(nodes)).unwrap_or(&[])
     }
 
     /// Past the next `nodes` nodes, which have a layer each.
     #[inline(always)]
     fn jump(&mut self, nodes: usize) {
         self.ends = self.ends.get(nodes..).unwrap_or(&[]);
-        self.to = self.to.wrapping_add(nodes);
+        self.to = self.to.wrapping_add(nodes as u16);
     }
 }
 
@@ -162,9 +161,6 @@ const fn blend(four: [KeyUv; 4], [a, b, c, d]: Weights, key_bits: u32) -> Layer 
     Layer { u: u.wrapping_shr(drop), v: v.wrapping_shr(drop) }
 }
 
-/// No chain.
-const NONE: u16 = u16::MAX;
-
 /// Layers of one label at neighbouring nodes of a row, one at each, which stand side by side in caller's memory.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
@@ -208,142 +204,68 @@ pub struct NodeRow<'m> {
     pub field: &'m mut [[i16; 2]],
 }
 
-/// Where a row's layers are collected node by node, in caller's memory: as much room as a row has.
-#[derive(Debug)]
-pub struct Collected<'m> {
-    /// How many layers follow on each other in one chain, and in which.
-    pub piece: &'m mut [[u16; 2]],
-    /// Positions.
-    pub layer: &'m mut [Layer],
-    /// Fields; empty where the bundle has none.
-    pub field: &'m mut [[i16; 2]],
+/// Layers of one label at neighbouring nodes, in caller's memory, one at each, which stand side by side in every key that carries them.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Piece {
+    /// Where in each key; [`NONE`]: nowhere, which only outer keys may say.
+    at: [u16; 4],
+    /// How many.
+    nodes: u16,
+    /// The chain that they are part of.
+    chain: u16,
 }
 
 /// A row of nodes that is being filled, from left to right.
 struct Filling<'f, 'm> {
     row: &'f mut NodeRow<'m>,
-    collected: &'f mut Collected<'m>,
-    pieces: usize,
-    /// Layers so far.
+    pieces: &'f mut [Piece],
+    /// Pieces so far.
     count: usize,
+    /// Layers that there is room for.
+    room: usize,
 }
 
 impl Filling<'_, '_> {
-    /// Layers that there is room for.
-    fn room(&self) -> usize {
-        self.collected.layer.len().min(self.row.layer.len()).saturating_sub(self.count)
-    }
-
-    /// The next `nodes` layers collected are of `label`, one at each node from `column` on; false where there is no room for a chain.
+    /// Puts layers of `label`, one at each of `nodes` nodes from `column` on.
     #[inline(always)]
-    fn put(&mut self, label: u8, column: usize, nodes: usize) -> bool {
-        let Some(last) = self.row.head.get_mut(usize::from(label)) else { return false };
-        let end = column.wrapping_add(nodes) as u16;
-        let chain = match self.row.chain.get_mut(usize::from(*last)) {
-            Some(chain) if chain.end == column as u16 => {
-                chain.end = end;
-                *last
-            }
+    fn put(&mut self, label: u8, column: u16, nodes: u16, at: [u16; 4]) {
+        let Some(left) = self.room.checked_sub(nodes.into()) else { return };
+        let Some(last) = self.row.head.get_mut(usize::from(label)) else { return };
+        let Some(piece) = self.pieces.get_mut(self.count) else { return };
+        let end = column.wrapping_add(nodes);
+        match self.row.chain.get_mut(usize::from(*last)) {
+            Some(chain) if chain.end == column => chain.end = end,
             _ => {
-                let new = self.row.chains as u16;
-                let Some(slot) = self.row.chain.get_mut(self.row.chains) else { return false };
-                *slot = Chain { first: column as u16, end, at: 0, next: NONE, label: label.into() };
+                let Some(slot) = self.row.chain.get_mut(self.row.chains) else { return };
+                *slot = Chain { first: column, end, at: 0, next: NONE, label: label.into() };
+                *last = self.row.chains as u16;
                 self.row.chains = self.row.chains.wrapping_add(1);
-                *last = new;
-                new
             }
-        };
-        self.count = self.count.wrapping_add(nodes);
-        if let Some([length, other]) = self.collected.piece.get_mut(self.pieces.wrapping_sub(1))
-            && *other == chain
-        {
-            *length = length.wrapping_add(nodes as u16);
-        } else if let Some(slot) = self.collected.piece.get_mut(self.pieces) {
-            *slot = [nodes as u16, chain];
-            self.pieces = self.pieces.wrapping_add(1);
         }
-        true
+        *piece = Piece { at, nodes, chain: *last };
+        (self.count, self.room) = (self.count.wrapping_add(1), left);
     }
 
-    /// Puts what was collected into chains.
-    fn end(self) {
-        let Self { row, collected, pieces, .. } = self;
-        let chains = row.chain.get_mut(..row.chains).unwrap_or(&mut []);
-        let mut at = 0u16;
-        for chain in &mut *chains {
-            // Until chains are linked, `next` is where the chain's next layer goes.
-            (chain.at, chain.next) = (at, at);
-            at = at.wrapping_add(chain.nodes() as u16);
-        }
-        let mut from = 0usize;
-        for &[length, chain] in collected.piece.get(..pieces).unwrap_or(&[]) {
-            let Some(chain) = chains.get_mut(usize::from(chain)) else { break };
-            let (to, length) = (usize::from(chain.next), usize::from(length));
-            chain.next = chain.next.wrapping_add(length as u16);
-            let next = from.wrapping_add(length);
-            copy(&mut *row.layer, to, collected.layer.get(from..next));
-            copy(&mut *row.field, to, collected.field.get(from..next));
-            from = next;
-        }
-        row.link();
-    }
-}
-
-/// Copies `from` to `target`, from its element `to` on.
-#[inline(always)]
-fn copy<T: Copy>(target: &mut [T], to: usize, from: Option<&[T]>) {
-    // Most are a few: a loop takes less than a call.
-    for (slot, &value) in target.get_mut(to..).unwrap_or(&mut []).iter_mut().zip(from.unwrap_or(&[])) {
-        *slot = value;
-    }
-}
-
-impl<'m> NodeRow<'m> {
-    /// Fills the row with the layers that both ends of the interval carry in row `row` of the grid's nodes, weighted; with none
-    /// outside the grid. Returns how many there are.
+    /// Finds the layers that both ends of the interval carry in the row of `columns` nodes from node `first` on; returns the pieces.
     #[inline(never)]
-    pub fn fill(&mut self, collected: &mut Collected<'m>, grid: Grid, row: Option<usize>, keys: &Around<'_, '_>, moment: &Moment) -> u32 {
-        self.head.fill(NONE);
-        self.chains = 0;
-        let Some(row) = row.filter(|&row| row < grid.node_rows()) else { return 0 };
-        let (linear, key_bits) = (moment.linear, keys.key_bits);
-        let columns = grid.node_columns();
-        let first = row.wrapping_mul(columns);
+    fn gather(mut self, keys: &Around<'_, '_>, first: usize, columns: usize) -> usize {
         let [mut before, mut from, mut to, mut after] =
             [keys.before, Some(keys.from), Some(keys.to), keys.after].map(|key| Walk::new(key, first, columns));
-        let [both, no_first, no_last, neither] = &moment.weights;
-        // Where there is no outer key, its weight is none: any other does in its place.
-        let whole = match (keys.before, keys.after) {
-            (Some(_), Some(_)) => both,
-            (None, Some(_)) => no_first,
-            (Some(_), None) => no_last,
-            (None, None) => neither,
-        };
-        let mut row = Filling { row: self, collected, pieces: 0, count: 0 };
         let mut column = 0usize;
         while column < columns {
             // Most nodes of most pictures carry one layer, of the same label as the node before.
-            if let Some(&label) = from.labels.get(from.to) {
-                let most = columns.wrapping_sub(column).min(row.room());
-                let most = to.alone(label, from.alone(label, most));
-                let most = if keys.before.is_some() { before.alone(label, most) } else { most };
-                let most = if keys.after.is_some() { after.alone(label, most) } else { most };
+            if let Some(&label) = from.labels.get(usize::from(from.to))
+                && from.ends.first() == Some(&from.to.wrapping_add(1))
+            {
+                let mut most = columns.wrapping_sub(column);
+                for (walk, wanted) in [(&from, true), (&to, true), (&before, keys.before.is_some()), (&after, keys.after.is_some())] {
+                    most = if wanted && most > 0 { walk.alone(label, most) } else { most };
+                }
                 if most > 0 {
-                    let [b, c] = [from.coming(most), to.coming(most)];
-                    let a = if keys.before.is_some() { before.coming(most) } else { b };
-                    let d = if keys.after.is_some() { after.coming(most) } else { c };
-                    let start = row.count;
-                    let slots = row.collected.layer.get_mut(start..).unwrap_or(&mut []);
-                    for (slot, ((&a, &b), (&c, &d))) in slots.iter_mut().zip(a.iter().zip(b).zip(c.iter().zip(d))) {
-                        *slot = blend([a, b, c, d].map(KeyUv), *whole, key_bits);
-                    }
-                    let slots = row.collected.field.get_mut(start..).unwrap_or(&mut []);
-                    for (index, slot) in slots.iter_mut().take(most).enumerate() {
-                        *slot = keys.field([from.to.wrapping_add(index), to.to.wrapping_add(index)], linear);
-                    }
-                    if !row.put(label, column, most) {
-                        break;
-                    }
+                    let outer = |key: Option<&Key<'_>>, walk: &Walk<'_>| if key.is_some() { walk.to } else { NONE };
+                    let at = [outer(keys.before, &before), from.to, to.to, outer(keys.after, &after)];
+                    self.put(label, column as u16, most as u16, at);
                     for walk in [&mut before, &mut from, &mut to, &mut after] {
                         walk.jump(most);
                     }
@@ -354,37 +276,94 @@ impl<'m> NodeRow<'m> {
             for walk in [&mut before, &mut from, &mut to, &mut after] {
                 walk.step();
             }
-            for index in from.from..from.to {
-                let Some(&label) = from.labels.get(index) else { break };
-                let Some(other) = to.seek(label) else { continue };
-                let at = |key: &Walk<'_>, index: usize| KeyUv(key.uv.get(index).copied().unwrap_or(0));
-                let (leave, arrive) = (before.seek(label), after.seek(label));
-                let [middle, next] = [at(&from, index), at(&to, other)];
-                // An outer key that has none weighs nothing.
-                let (first, last) = (leave.map_or(middle, |a| at(&before, a)), arrive.map_or(next, |b| at(&after, b)));
-                let weights = match (leave.is_some(), arrive.is_some()) {
-                    (true, true) => both,
-                    (false, true) => no_first,
-                    (true, false) => no_last,
-                    (false, false) => neither,
-                };
-                let count = row.count;
-                if row.room() == 0 || !row.put(label, column, 1) {
-                    break;
-                }
-                if let Some(slot) = row.collected.layer.get_mut(count) {
-                    *slot = blend([first, middle, next, last], *weights, key_bits);
-                }
-                if let Some(slot) = row.collected.field.get_mut(count) {
-                    *slot = keys.field([index, other], linear);
+            while let Some(label) = from.label() {
+                let index = from.next;
+                from.next = from.next.wrapping_add(1);
+                let other = to.seek(label);
+                if other != NONE {
+                    self.put(label, column as u16, 1, [before.seek(label), index, other, after.seek(label)]);
                 }
             }
             column = column.wrapping_add(1);
         }
-        let count = row.count;
-        row.end();
+        self.count
+    }
+}
+
+impl<'m> NodeRow<'m> {
+    /// Fills the row with the layers that both ends of the interval carry in row `row` of the grid's nodes, weighted; with none
+    /// outside the grid. Returns how many there are. `pieces` is room for as many as there are layers.
+    pub fn fill(&mut self, pieces: &mut [Piece], grid: Grid, row: Option<usize>, keys: &Around<'_, '_>, moment: &Moment) -> u32 {
+        self.head.fill(NONE);
+        self.chains = 0;
+        let Some(row) = row.filter(|&row| row < grid.node_rows()) else { return 0 };
+        let columns = grid.node_columns();
+        let room = self.layer.len().min(usize::from(NONE));
+        let filling = Filling { row: self, pieces: &mut *pieces, count: 0, room };
+        let count = filling.gather(keys, row.wrapping_mul(columns), columns);
+        let mut at = 0u16;
+        for chain in self.chain.get_mut(..self.chains).unwrap_or(&mut []) {
+            // Until chains are linked, `next` is where the chain's next layer goes.
+            (chain.at, chain.next) = (at, at);
+            at = at.wrapping_add(chain.nodes() as u16);
+        }
+        self.weigh(pieces.get(..count).unwrap_or(&[]), keys, moment);
+        self.link();
         self.halve();
-        count as u32
+        at.into()
+    }
+
+    /// Works out the layers of `pieces`.
+    #[inline(never)]
+    fn weigh(&mut self, pieces: &[Piece], keys: &Around<'_, '_>, moment: &Moment) {
+        let [both, no_first, no_last, neither] = &moment.weights;
+        let chains = self.chain.get_mut(..self.chains).unwrap_or(&mut []);
+        let [start, end] = [keys.before, keys.after].map(|key| key.map_or(&[][..], |key| &*key.uv));
+        let (from, to) = (&*keys.from.uv, &*keys.to.uv);
+        for piece in pieces {
+            let nodes = usize::from(piece.nodes);
+            let Some(chain) = chains.get_mut(usize::from(piece.chain)) else { break };
+            let place = usize::from(chain.next);
+            chain.next = chain.next.wrapping_add(piece.nodes);
+            let [a, b, c, d] = piece.at.map(usize::from);
+            let (Some(b), Some(c)) = (from.get(b..).and_then(|uv| uv.get(..nodes)), to.get(c..).and_then(|uv| uv.get(..nodes))) else { break };
+            let a = start.get(a..).and_then(|uv| uv.get(..nodes));
+            let d = end.get(d..).and_then(|uv| uv.get(..nodes));
+            let weights = match (a, d) {
+                (Some(_), Some(_)) => both,
+                (None, Some(_)) => no_first,
+                (Some(_), None) => no_last,
+                (None, None) => neither,
+            };
+            // An outer key that has none weighs nothing.
+            let (a, d) = (a.unwrap_or(b), d.unwrap_or(c));
+            let slots = self.layer.get_mut(place..).unwrap_or(&mut []);
+            for (slot, ((&a, &b), (&c, &d))) in slots.iter_mut().zip(a.iter().zip(b).zip(c.iter().zip(d))) {
+                *slot = blend([a, b, c, d].map(KeyUv), *weights, keys.key_bits);
+            }
+        }
+        if !self.field.is_empty() {
+            self.distances(pieces, keys, moment.linear);
+        }
+    }
+
+    /// Works out the fields of `pieces`.
+    #[inline(never)]
+    fn distances(&mut self, pieces: &[Piece], keys: &Around<'_, '_>, linear: i32) {
+        let chains = self.chain.get_mut(..self.chains).unwrap_or(&mut []);
+        for chain in &mut *chains {
+            chain.next = chain.at;
+        }
+        for piece in pieces {
+            let Some(chain) = chains.get_mut(usize::from(piece.chain)) else { break };
+            let place = usize::from(chain.next);
+            chain.next = chain.next.wrapping_add(piece.nodes);
+            let [_, from, to, _] = piece.at.map(usize::from);
+            let slots = self.field.get_mut(place..).unwrap_or(&mut []);
+            for (index, slot) in slots.iter_mut().take(usize::from(piece.nodes)).enumerate() {
+                *slot = keys.field([from.wrapping_add(index), to.wrapping_add(index)], linear);
+            }
+        }
     }
 
     /// Fills the row with what lies halfway between rows `from` and `to`, where both carry it; `before` and `after` are the rows
