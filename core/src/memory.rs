@@ -11,7 +11,7 @@ use crate::nodes;
 use crate::pack::{self, Picture, Recent, Scratch};
 use crate::plan::{Edge, Mixed, Plan, Run};
 use crate::record::Stream;
-use crate::row::{Chain, Layer, NodeRow, Piece};
+use crate::row::{Chain, NodeRow, Piece, Point};
 use crate::sheet::{RowSheets, Sheet, Stretch};
 use bytemuck::Pod;
 
@@ -109,8 +109,8 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, texture: Texture<'m>) -
             chain: cutter.take::<Chain>(if_wanted(row_layers)),
             chains: 0,
             head: cutter.take(if_wanted(bundle.label_count())),
-            layer: cutter.take::<Layer>(if_wanted(row_layers)),
-            middle: cutter.take::<Layer>(if cubic { if_wanted(row_layers) } else { 0 }),
+            point: cutter.take::<Point>(if_wanted(row_layers)),
+            cubic,
             field: cutter.take::<[i16; 2]>(if fields { if_wanted(row_layers) } else { 0 }),
         }
     };

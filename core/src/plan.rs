@@ -10,7 +10,7 @@ use crate::coverage::{Chart, Cover};
 use crate::fixed::PlayUv;
 use crate::format::{MAX_SHEETS, SPACE_CUBIC, STRIP};
 use crate::lists::{CHART, FIELD};
-use crate::row::{Layer, NodeRow};
+use crate::row::Layer;
 use crate::sheet::{Block, Corners, RowSheets, Rows, Sheet, Stretch};
 
 /// A side of a block in a run, in caller's memory: where it stands at the strip's current row, and how far that is from row to row.
@@ -178,12 +178,11 @@ impl Site<'_, '_, '_> {
         Block { rows: self.rows, quarter: Some([block & 1 == 1, strip & 1 == 1]) }
     }
 
-    /// What is above and below strip `strip` where space is cubic, from the corners of `sheet` on.
-    fn lines(&self, strip: u32, sheet: &Sheet) -> Option<[Line<'_>; 2]> {
+    /// What is above and below strip `strip` where space is cubic, from the left corners of `sheet` on: nodes, and halfway to the next.
+    fn lines(&self, strip: u32, sheet: &Sheet) -> [&[Layer]; 2] {
         let ([top, halfway, bottom], [a, b, c]) = (self.rows, sheet.nodes());
         let lines = if strip & 1 == 0 { [(top, a), (halfway, b)] } else { [(halfway, b), (bottom, c)] };
-        let [above, below] = lines.map(|(row, from)| Line::new(row, from));
-        above.zip(below).map(|(above, below)| [above, below])
+        lines.map(|(row, from)| row.point.get(usize::from(from)..).and_then(|points| bytemuck::try_cast_slice(points).ok()).unwrap_or(&[]))
     }
 
     fn cubic(&self) -> bool {
@@ -195,28 +194,6 @@ impl Site<'_, '_, '_> {
     pub fn block(&self, block: u32, strip: u32) -> Block<'_, '_> {
         let quarter = self.cubic().then_some([block & 1 == 1, strip & 1 == 1]);
         Block { rows: self.rows, quarter }
-    }
-}
-
-/// A row of nodes as cubic space has it along a strip's upper or lower side: where nodes are, and halfway to the next.
-#[derive(Clone, Copy, Debug)]
-struct Line<'l> {
-    layer: &'l [Layer],
-    middle: &'l [Layer],
-}
-
-impl<'l> Line<'l> {
-    /// Part of a line, from layer `from` on.
-    fn new(row: &'l NodeRow<'_>, from: u16) -> Option<Self> {
-        let from = usize::from(from);
-        Some(Self { layer: row.layer.get(from.wrapping_add(1)..)?, middle: row.middle.get(from..)? })
-    }
-
-    /// The points in the middle and at the right side of cell after cell, from the `along`-th on.
-    #[inline(always)]
-    fn points(&self, along: usize) -> impl Iterator<Item = [PlayUv; 2]> + 'l {
-        let (middle, layer) = (self.middle.get(along..).unwrap_or(&[]), self.layer.get(along..).unwrap_or(&[]));
-        middle.iter().zip(layer).map(|(middle, layer)| [middle.uv(), layer.uv()])
     }
 }
 
@@ -242,14 +219,17 @@ impl Plan<'_> {
     /// Plans a stretch of cells that show one sheet.
     fn smooth(&mut self, across: &mut Across<'_, '_, '_>, stretch: Stretch, sheet: &Sheet) {
         let Across { site, window, strip, log2, width, .. } = *across;
-        let lines = if site.cubic() { site.lines(strip, sheet) } else { None };
+        let lines = site.lines(strip, sheet);
         let before = across.left;
         let mut along = 0u16;
         while along < stretch.cells && across.left < width {
             // In pictures 512 wide, as most are; others go by `append` alone. Likewise the cell that the screen's edge cuts.
-            if let (Some(window @ Window { width_log2: 9, .. }), Some(lines)) = (window, lines) {
+            if let Some(Window { width_log2: 9, .. }) = window
+                && site.cubic()
+            {
                 let most = (width.saturating_sub(across.left) >> log2 >> 1).min(stretch.cells.wrapping_sub(along).into());
-                let cells = self.extend(across.block, usize::from(along), most as usize, sheet.label(), lines, window, log2);
+                let rest = lines.map(|line| line.get(usize::from(along).wrapping_mul(2)..).unwrap_or(&[]));
+                let cells = self.extend(across.block, most as usize, sheet.label(), rest, log2);
                 along = along.wrapping_add(cells);
                 across.block = across.block.wrapping_add(u32::from(cells).wrapping_mul(2));
                 across.left = across.block.wrapping_shl(log2);
@@ -289,45 +269,46 @@ impl Plan<'_> {
         *kind = kind.wrapping_add(pixels);
     }
 
-    /// Appends smooth cells from the `along`-th of `lines` on, the first of which begins with block `block`, to the last run, both blocks of
-    /// each, as long as they follow it and fit into its window, `most` at most; returns how many.
+    /// Appends smooth cells, the first of which begins with block `block`, to the last run, both blocks of each, as long as they follow it and fit
+    /// into its window, `most` at most; returns how many. `above` and `below` start at their left corners.
     #[inline(never)]
-    #[expect(clippy::too_many_arguments, reason = "the cells' place on the screen and in the rows of nodes are two")]
-    fn extend(&mut self, block: u32, along: usize, most: usize, label: u8, [above, below]: [Line<'_>; 2], window: Window, log2: u32) -> u16 {
+    fn extend(&mut self, block: u32, most: usize, label: u8, [above, below]: [&[Layer]; 2], log2: u32) -> u16 {
         let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return 0 };
         if run.label != u16::from(label) || u32::from(run.block).wrapping_add(u32::from(run.blocks)) != block {
             return 0;
         }
+        let (Some((_, above)), Some((_, below))) = (above.split_first(), below.split_first()) else { return 0 };
         let Some(edges) = self.edge.get_mut(self.edges..) else { return 0 };
-        // In known places the compiler counts better.
-        let window = Window { width_log2: 9, rows_log2: window.rows_log2 };
+        let window = Window { width_log2: 9, rows_log2: 5 };
         let row = u32::from(run.row);
         let least = (row as i32).wrapping_shl(16).wrapping_add(MARGIN);
         let [across, down] = [window.width_log2, window.rows_log2].map(|log2| 1u32.wrapping_shl(log2.wrapping_add(16)));
         let [wide, high] = [across, down].map(|size| size.wrapping_sub((2 * MARGIN) as u32));
-        let inside = |uv: PlayUv| (uv.u.wrapping_sub(MARGIN) as u32) < wide && (uv.v.wrapping_sub(least) as u32) < high;
-        // As in `append`: steps across of less than half the width, which is a power of two.
-        let near = |from: i32, to: PlayUv| (to.u.wrapping_sub(from).wrapping_add((across >> 1) as i32) as u32) < across;
         let [mut from, mut to] = self.last;
-        let mut done = 0u16;
-        let points = above.points(along).zip(below.points(along)).take(most);
-        for (([a, b], [c, d]), [middle, right]) in points.zip(edges.as_chunks_mut::<2>().0) {
-            if !(inside(a) && inside(c) && near(from, a) && near(to, c)) {
+        let mut done = 0usize;
+        for ((edge, a), b) in edges.iter_mut().zip(above).zip(below).take(most.wrapping_mul(2)) {
+            let (a, b) = (a.uv(), b.uv());
+            // As in `append`: steps across of less than half the width, which is a power of two.
+            let [near, far] = [a.u.wrapping_sub(from), b.u.wrapping_sub(to)].map(|step| step.wrapping_add((across >> 1) as i32) as u32);
+            let inside = (a.u.wrapping_sub(MARGIN) as u32) < wide && (b.u.wrapping_sub(MARGIN) as u32) < wide && (near | far) < across;
+            if !(inside && (a.v.wrapping_sub(least) as u32) < high && (b.v.wrapping_sub(least) as u32) < high) {
                 break;
             }
-            *middle = window.edge(a, c, row, log2);
-            if !(inside(b) && inside(d) && near(a.u, b) && near(c.u, d)) {
-                break;
-            }
-            *right = window.edge(b, d, row, log2);
-            (from, to) = (b.u, d.u);
+            *edge = window.edge(a, b, row, log2);
+            (from, to) = (a.u, b.u);
             done = done.wrapping_add(1);
         }
-        let blocks = done.wrapping_mul(2);
-        run.blocks = run.blocks.wrapping_add(blocks);
-        self.edges = self.edges.wrapping_add(blocks.into());
+        if done & 1 == 1 {
+            // Half a cell is for `append`, which finds the same.
+            done = done.wrapping_sub(1);
+            let before = |line: &[Layer], known: i32| done.checked_sub(1).and_then(|last| line.get(last)).map_or(known, |layer| layer.uv().u);
+            let [a, b] = self.last;
+            (from, to) = (before(above, a), before(below, b));
+        }
+        run.blocks = run.blocks.wrapping_add(done as u16);
+        self.edges = self.edges.wrapping_add(done);
         self.last = [from, to];
-        done
+        (done >> 1) as u16
     }
 
     fn mix(&mut self, mixed: Mixed) {

@@ -38,6 +38,16 @@ impl Layer {
 /// No layer, no chain.
 const NONE: u16 = u16::MAX;
 
+/// A layer of a row of nodes, in caller's memory.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Point {
+    /// The layer.
+    pub at: Layer,
+    /// Where space is cubic, what is halfway to the next one of its chain.
+    pub middle: Layer,
+}
+
 /// Steps through the nodes of a key's row, from left to right.
 #[derive(Clone, Copy, Debug)]
 struct Walk<'w> {
@@ -82,6 +92,22 @@ impl<'w> Walk<'w> {
             self.next = self.next.wrapping_add(1);
         }
         NONE
+    }
+
+    /// Whether the node's layers are of the same labels as those of `other`.
+    #[inline(always)]
+    fn same(&self, other: &Self) -> bool {
+        let (mut index, mut place) = (self.next, other.next);
+        if self.to.wrapping_sub(index) != other.to.wrapping_sub(place) {
+            return false;
+        }
+        while index < self.to {
+            if self.labels.get(usize::from(index)) != other.labels.get(usize::from(place)) {
+                return false;
+            }
+            (index, place) = (index.wrapping_add(1), place.wrapping_add(1));
+        }
+        true
     }
 
     /// How many of the next `most` nodes carry a layer of `label` and nothing else, up to the first that does not.
@@ -178,8 +204,8 @@ pub struct Chain {
 impl Chain {
     /// The first layer and those after it.
     #[inline(always)]
-    fn of<'l, T>(&self, layers: &'l [T]) -> &'l [T] {
-        layers.get(usize::from(self.at)..).and_then(|layers| layers.get(..self.nodes())).unwrap_or(&[])
+    fn of<'l>(&self, points: &'l [Point]) -> &'l [Point] {
+        points.get(usize::from(self.at)..).and_then(|points| points.get(..self.nodes())).unwrap_or(&[])
     }
 
     fn nodes(&self) -> usize {
@@ -197,9 +223,9 @@ pub struct NodeRow<'m> {
     /// The first chain of every label, from the left; [`NONE`]: there is none.
     pub head: &'m mut [u16],
     /// Positions, Q15.16 texels, chain by chain.
-    pub layer: &'m mut [Layer],
-    /// Where space is cubic, the positions halfway between each layer and the next one of its chain.
-    pub middle: &'m mut [Layer],
+    pub point: &'m mut [Point],
+    /// Space is cubic: what is halfway between points is wanted.
+    pub cubic: bool,
     /// Fields, Q8 pixels; empty where the bundle has none.
     pub field: &'m mut [[i16; 2]],
 }
@@ -208,7 +234,7 @@ pub struct NodeRow<'m> {
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Piece {
-    /// Where in each key; [`NONE`]: nowhere, which only outer keys may say.
+    /// Where in each key that there is; [`NONE`]: nowhere, which only outer keys may say.
     at: [u16; 4],
     /// How many.
     nodes: u16,
@@ -263,9 +289,7 @@ impl Filling<'_, '_> {
                     most = if wanted && most > 0 { walk.alone(label, most) } else { most };
                 }
                 if most > 0 {
-                    let outer = |key: Option<&Key<'_>>, walk: &Walk<'_>| if key.is_some() { walk.to } else { NONE };
-                    let at = [outer(keys.before, &before), from.to, to.to, outer(keys.after, &after)];
-                    self.put(label, column as u16, most as u16, at);
+                    self.put(label, column as u16, most as u16, [before.to, from.to, to.to, after.to]);
                     for walk in [&mut before, &mut from, &mut to, &mut after] {
                         walk.jump(most);
                     }
@@ -275,6 +299,15 @@ impl Filling<'_, '_> {
             }
             for walk in [&mut before, &mut from, &mut to, &mut after] {
                 walk.step();
+            }
+            let [first, last] = [keys.before.is_none() || from.same(&before), keys.after.is_none() || from.same(&after)];
+            if first && last && from.same(&to) {
+                let mut at = [before.next, from.next, to.next, after.next];
+                while let Some(label) = from.label() {
+                    self.put(label, column as u16, 1, at);
+                    from.next = from.next.wrapping_add(1);
+                    at = at.map(|at| at.wrapping_add(1));
+                }
             }
             while let Some(label) = from.label() {
                 let index = from.next;
@@ -298,7 +331,7 @@ impl<'m> NodeRow<'m> {
         self.chains = 0;
         let Some(row) = row.filter(|&row| row < grid.node_rows()) else { return 0 };
         let columns = grid.node_columns();
-        let room = self.layer.len().min(usize::from(NONE));
+        let room = self.point.len().min(usize::from(NONE));
         let filling = Filling { row: self, pieces: &mut *pieces, count: 0, room };
         let count = filling.gather(keys, row.wrapping_mul(columns), columns);
         let mut at = 0u16;
@@ -321,25 +354,22 @@ impl<'m> NodeRow<'m> {
         let [start, end] = [keys.before, keys.after].map(|key| key.map_or(&[][..], |key| &*key.uv));
         let (from, to) = (&*keys.from.uv, &*keys.to.uv);
         for piece in pieces {
-            let nodes = usize::from(piece.nodes);
             let Some(chain) = chains.get_mut(usize::from(piece.chain)) else { break };
             let place = usize::from(chain.next);
             chain.next = chain.next.wrapping_add(piece.nodes);
-            let [a, b, c, d] = piece.at.map(usize::from);
-            let (Some(b), Some(c)) = (from.get(b..).and_then(|uv| uv.get(..nodes)), to.get(c..).and_then(|uv| uv.get(..nodes))) else { break };
-            let a = start.get(a..).and_then(|uv| uv.get(..nodes));
-            let d = end.get(d..).and_then(|uv| uv.get(..nodes));
-            let weights = match (a, d) {
-                (Some(_), Some(_)) => both,
-                (None, Some(_)) => no_first,
-                (Some(_), None) => no_last,
-                (None, None) => neither,
+            let [mut a, mut b, mut c, mut d] = piece.at.map(usize::from);
+            let weights = match (a < start.len(), d < end.len()) {
+                (true, true) => both,
+                (false, true) => no_first,
+                (true, false) => no_last,
+                (false, false) => neither,
             };
-            // An outer key that has none weighs nothing.
-            let (a, d) = (a.unwrap_or(b), d.unwrap_or(c));
-            let slots = self.layer.get_mut(place..).unwrap_or(&mut []);
-            for (slot, ((&a, &b), (&c, &d))) in slots.iter_mut().zip(a.iter().zip(b).zip(c.iter().zip(d))) {
-                *slot = blend([a, b, c, d].map(KeyUv), *weights, keys.key_bits);
+            for slot in self.point.get_mut(place..).unwrap_or(&mut []).iter_mut().take(usize::from(piece.nodes)) {
+                // An outer key that has none weighs nothing.
+                let [first, last] = [(start, a), (end, d)].map(|(uv, at)| KeyUv(uv.get(at).copied().unwrap_or(0)));
+                let (Some(&leave), Some(&arrive)) = (from.get(b), to.get(c)) else { break };
+                slot.at = blend([first, KeyUv(leave), KeyUv(arrive), last], *weights, keys.key_bits);
+                [a, b, c, d] = [a, b, c, d].map(|at| at.wrapping_add(1));
             }
         }
         if !self.field.is_empty() {
@@ -358,10 +388,10 @@ impl<'m> NodeRow<'m> {
             let Some(chain) = chains.get_mut(usize::from(piece.chain)) else { break };
             let place = usize::from(chain.next);
             chain.next = chain.next.wrapping_add(piece.nodes);
-            let [_, from, to, _] = piece.at.map(usize::from);
-            let slots = self.field.get_mut(place..).unwrap_or(&mut []);
-            for (index, slot) in slots.iter_mut().take(usize::from(piece.nodes)).enumerate() {
-                *slot = keys.field([from.wrapping_add(index), to.wrapping_add(index)], linear);
+            let [_, mut from, mut to, _] = piece.at.map(usize::from);
+            for slot in self.field.get_mut(place..).unwrap_or(&mut []).iter_mut().take(usize::from(piece.nodes)) {
+                *slot = keys.field([from, to], linear);
+                (from, to) = (from.wrapping_add(1), to.wrapping_add(1));
             }
         }
     }
@@ -384,11 +414,11 @@ impl<'m> NodeRow<'m> {
                 let Some(slot) = self.chain.get_mut(self.chains) else { break };
                 *slot = Chain { first, end, at: count as u16, next: NONE, label: upper.label };
                 self.chains = self.chains.wrapping_add(1);
-                let Some(slots) = self.layer.get_mut(count..).and_then(|layers| layers.get_mut(..slot.nodes())) else { break };
+                let Some(slots) = self.point.get_mut(count..).and_then(|points| points.get_mut(..slot.nodes())) else { break };
                 count = count.wrapping_add(slots.len());
                 let (mut slots, mut column) = (slots, first);
-                let mut from = cut(upper, from.layer, first);
-                let mut to = cut(lower, to.layer, first);
+                let mut from = cut(upper, from.point, first);
+                let mut to = cut(lower, to.point, first);
                 while !slots.is_empty() {
                     let ((above, high), (below, low)) = (before.part(upper.label, column), after.part(upper.label, column));
                     let stop = end.min(high).min(low);
@@ -407,14 +437,14 @@ impl<'m> NodeRow<'m> {
 
     /// The layers of `label` from node `column` on, and the node where that ends: that they do, or that there are none. Where there are none,
     /// the slice is empty.
-    fn part(&self, label: u16, column: u16) -> (&[Layer], u16) {
+    fn part(&self, label: u16, column: u16) -> (&[Point], u16) {
         let mut next = self.head.get(usize::from(label)).copied().unwrap_or(NONE);
         while let Some(chain) = self.chain.get(usize::from(next)) {
             if column < chain.first {
                 return (&[], chain.first);
             }
             if column < chain.end {
-                return (cut(chain, self.layer, column), chain.end);
+                return (cut(chain, self.point, column), chain.end);
             }
             next = chain.next;
         }
@@ -436,28 +466,26 @@ impl<'m> NodeRow<'m> {
         }
     }
 
-    /// Works out what lies halfway between each layer and the next one of its chain, where there is room for it.
+    /// Works out what lies halfway between each layer and the next one of its chain, where that is wanted.
     #[inline(never)]
     fn halve(&mut self) {
-        let mut middles = &mut *self.middle;
-        if middles.is_empty() {
+        if !self.cubic {
             return;
         }
+        let mut points = &mut *self.point;
         for chain in self.chain.get(..self.chains).unwrap_or(&[]) {
-            let layers = chain.of(self.layer);
-            let Some((slots, rest)) = middles.split_at_mut_checked(layers.len()) else { break };
-            middles = rest;
-            let [first, second, layers @ ..] = layers else { continue };
-            let (mut before, mut from, mut to) = (None, *first, *second);
-            let mut slots = slots.iter_mut();
-            for &after in layers {
-                let Some(slot) = slots.next() else { break };
-                *slot = Layer::middle(before, from, to, Some(after));
-                (before, from, to) = (Some(from), to, after);
+            let Some((mine, rest)) = points.split_at_mut_checked(chain.nodes()) else { break };
+            points = rest;
+            // Each point waits for two more.
+            let mut mine = mine.iter_mut();
+            let (Some(mut last), Some(mut here)) = (mine.next(), mine.next()) else { continue };
+            let mut before = None;
+            for next in mine {
+                last.middle = Layer::middle(before, last.at, here.at, Some(next.at));
+                before = Some(last.at);
+                (last, here) = (here, next);
             }
-            if let Some(slot) = slots.next() {
-                *slot = Layer::middle(before, from, to, None);
-            }
+            last.middle = Layer::middle(before, last.at, here.at, None);
         }
     }
 
@@ -483,48 +511,41 @@ impl<'m> NodeRow<'m> {
         self.field.get(usize::from(index)).copied().unwrap_or([1, 1])
     }
 
-    /// Layer `index`.
+    /// Layer `index`, and what is halfway to the next one of its chain.
     #[must_use]
     #[inline]
-    pub fn layer(&self, index: u16) -> Layer {
-        self.layer.get(usize::from(index)).copied().unwrap_or_default()
-    }
-
-    /// What lies halfway from layer `index` to the next one of its chain.
-    #[must_use]
-    #[inline]
-    pub fn halfway(&self, index: u16) -> Layer {
-        self.middle.get(usize::from(index)).copied().unwrap_or_default()
+    pub fn point(&self, index: u16) -> Point {
+        self.point.get(usize::from(index)).copied().unwrap_or_default()
     }
 }
 
 /// The layers of `chain` from node `column` on, which it has.
-fn cut<'l>(chain: &Chain, layers: &'l [Layer], column: u16) -> &'l [Layer] {
-    chain.of(layers).get(usize::from(column.wrapping_sub(chain.first))..).unwrap_or(&[])
+fn cut<'l>(chain: &Chain, points: &'l [Point], column: u16) -> &'l [Point] {
+    chain.of(points).get(usize::from(column.wrapping_sub(chain.first))..).unwrap_or(&[])
 }
 
 /// Fills `slots` with what lies halfway between `from` and `to`; `before` and `after` are what comes before and after, or empty.
-fn middles(slots: &mut [Layer], from: &[Layer], to: &[Layer], before: &[Layer], after: &[Layer]) {
+fn middles(slots: &mut [Point], from: &[Point], to: &[Point], before: &[Point], after: &[Point]) {
     let inner = slots.iter_mut().zip(from.iter().zip(to));
     match (before.is_empty(), after.is_empty()) {
         (false, false) => {
-            for ((slot, (&from, &to)), (&before, &after)) in inner.zip(before.iter().zip(after)) {
-                *slot = Layer::middle(Some(before), from, to, Some(after));
+            for ((slot, (from, to)), (before, after)) in inner.zip(before.iter().zip(after)) {
+                slot.at = Layer::middle(Some(before.at), from.at, to.at, Some(after.at));
             }
         }
         (false, true) => {
-            for ((slot, (&from, &to)), &before) in inner.zip(before) {
-                *slot = Layer::middle(Some(before), from, to, None);
+            for ((slot, (from, to)), before) in inner.zip(before) {
+                slot.at = Layer::middle(Some(before.at), from.at, to.at, None);
             }
         }
         (true, false) => {
-            for ((slot, (&from, &to)), &after) in inner.zip(after) {
-                *slot = Layer::middle(None, from, to, Some(after));
+            for ((slot, (from, to)), after) in inner.zip(after) {
+                slot.at = Layer::middle(None, from.at, to.at, Some(after.at));
             }
         }
         (true, true) => {
-            for (slot, (&from, &to)) in inner {
-                *slot = Layer::middle(None, from, to, None);
+            for (slot, (from, to)) in inner {
+                slot.at = Layer::middle(None, from.at, to.at, None);
             }
         }
     }

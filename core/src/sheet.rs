@@ -4,7 +4,7 @@
 use crate::fixed::PlayUv;
 use crate::grid::Grid;
 use crate::lists::Lists;
-use crate::row::{Layer, NodeRow};
+use crate::row::NodeRow;
 
 /// One sheet of a cell, in caller's memory: its label, its test, and where its layer at the cell's left edge stands in the rows
 /// above, halfway down and below; that at the right edge is the next. Halfway there is only where space is cubic.
@@ -144,14 +144,15 @@ impl Block<'_, '_> {
         let [top, halfway, bottom] = self.rows;
         let [a, b, c] = sheet.nodes;
         let Some([right, lower]) = self.quarter else {
-            return [top.layer(a), top.layer(a.wrapping_add(1)), bottom.layer(c), bottom.layer(c.wrapping_add(1))].map(Layer::uv);
+            return [top.point(a), top.point(a.wrapping_add(1)), bottom.point(c), bottom.point(c.wrapping_add(1))].map(|point| point.at.uv());
         };
         let (above, below) = if lower { ((halfway, b), (bottom, c)) } else { ((top, a), (halfway, b)) };
         let edge = |(row, left): (&NodeRow<'_>, u16)| {
-            if right { [row.halfway(left), row.layer(left.wrapping_add(1))] } else { [row.layer(left), row.halfway(left)] }
+            let point = row.point(left);
+            if right { [point.middle, row.point(left.wrapping_add(1)).at] } else { [point.at, point.middle] }
         };
         let ([a, b], [c, d]) = (edge(above), edge(below));
-        [a, b, c, d].map(Layer::uv)
+        [a, b, c, d].map(|layer| layer.uv())
     }
 
     /// Field `which` of `sheet` at the cell's corners, Q16 pixels: straight from edge to edge of the cell, whatever space is.
