@@ -253,9 +253,8 @@ impl Plan<'_> {
     /// Plans a cell that shows several sheets, or none.
     fn cell(&mut self, across: &mut Across<'_, '_, '_>, stretch: Stretch, sheets: &[Sheet]) {
         let before = across.left;
-        for _ in 0..across.blocks() {
+        for shown in candidates(across.site, across.strip, sheets).into_iter().take(across.blocks() as usize) {
             let place = across.place();
-            let shown = candidates(across.site, &place, sheets);
             let single = sheets.get(shown.trailing_zeros() as usize).filter(|_| shown.is_power_of_two());
             if !single.is_some_and(|sheet| self.append(across, sheet, place.corners(sheet))) {
                 self.mix(Mixed { block: across.block as u16, sheet: stretch.sheet, along: 0, sheets: shown });
@@ -414,59 +413,76 @@ impl Across<'_, '_, '_> {
     }
 }
 
-/// Which of a torn cell's `sheets` the block can show, a bit each: those that cover part of it, in front of the first that
-/// covers all of it.
+/// Which of a torn cell's `sheets` each of its blocks in strip `strip` can show, a bit each: those that cover part of it, in front of the
+/// first that covers all of it. Where a cell is one block, the second is none.
 #[inline(never)]
-fn candidates(site: &Site<'_, '_, '_>, block: &Block<'_, '_>, sheets: &[Sheet]) -> u16 {
-    let mut shown = 0u16;
+fn candidates(site: &Site<'_, '_, '_>, strip: u32, sheets: &[Sheet]) -> [u16; 2] {
+    let (cubic, lower) = (site.cubic(), strip & 1 == 1);
+    let blocks = [0, 1].map(|right| site.block(right, strip));
+    let mut shown = [0u16; 2];
+    let mut open = [true, cubic];
     let last = sheets.len().wrapping_sub(1);
     for (place, sheet) in sheets.iter().enumerate().take(MAX_SHEETS) {
         let bit = 1u16.wrapping_shl(place as u32);
-        if place == last {
-            return shown | bit;
-        }
-        let record = site.bundle.label(sheet.label());
-        let mut cover = Cover::All;
-        if sheet.test() != CHART {
-            cover = field_cover(block.field(sheet, 0), block.quarter);
-            if record.flags & STRIP != 0 {
-                cover = cover.and(field_cover(block.field(sheet, 1), block.quarter));
+        let mut covers = [Cover::All; 2];
+        if place != last {
+            let record = site.bundle.label(sheet.label());
+            if sheet.test() != CHART {
+                let [first, ..] = &blocks;
+                covers = field_covers(first.field(sheet, 0), cubic, lower);
+                if record.flags & STRIP != 0 {
+                    let [left, right] = field_covers(first.field(sheet, 1), cubic, lower);
+                    covers = [covers[0].and(left), covers[1].and(right)];
+                }
+            }
+            if sheet.test() != FIELD {
+                let chart = Chart::new(&record);
+                for ((cover, block), open) in covers.iter_mut().zip(&blocks).zip(open) {
+                    if open && *cover != Cover::Nothing {
+                        *cover = cover.and(chart.cover(&block.corners(sheet)));
+                    }
+                }
             }
         }
-        if sheet.test() != FIELD && cover != Cover::Nothing {
-            cover = cover.and(Chart::new(&record).cover(&block.corners(sheet)));
+        for ((shown, cover), open) in shown.iter_mut().zip(covers).zip(&mut open) {
+            if *open && cover != Cover::Nothing {
+                *shown |= bit;
+                *open = cover != Cover::All;
+            }
         }
-        match cover {
-            Cover::Nothing => {}
-            Cover::Part => shown |= bit,
-            Cover::All => return shown | bit,
+        if open == [false; 2] {
+            break;
         }
     }
     shown
 }
 
-/// How much of a block a field of `corners` at the cell's corners covers.
-fn field_cover(corners: [i32; 4], quarter: Option<[bool; 2]>) -> Cover {
-    let [mut a, mut b, mut c, mut d] = corners;
-    if let Some([right, lower]) = quarter {
-        let middle = |x: i32, y: i32| x.wrapping_add(y) >> 1;
-        if lower {
-            (a, b) = (middle(a, c), middle(b, d));
-        } else {
-            (c, d) = (middle(a, c), middle(b, d));
-        }
-        if right {
-            (a, c) = (middle(a, b), middle(c, d));
-        } else {
-            (b, d) = (middle(a, b), middle(c, d));
-        }
+/// How much of a cell's blocks in one of its strips a field of `corners` at the cell's corners covers: of the left one and the right one where
+/// they are `quarters`, of the cell where not.
+#[inline(always)]
+fn field_covers([mut a, mut b, mut c, mut d]: [i32; 4], quarters: bool, lower: bool) -> [Cover; 2] {
+    if !quarters {
+        return [field_cover([a, b, c, d]); 2];
     }
+    let middle = |x: i32, y: i32| x.wrapping_add(y) >> 1;
+    let (left, right) = (middle(a, c), middle(b, d));
+    if lower {
+        (a, b) = (left, right);
+    } else {
+        (c, d) = (left, right);
+    }
+    let (above, below) = (middle(a, b), middle(c, d));
+    [field_cover([a, above, c, below]), field_cover([above, b, below, d])]
+}
+
+/// How much of a block a field of these values at its corners covers.
+#[inline(always)]
+fn field_cover([a, b, c, d]: [i32; 4]) -> Cover {
     // Rounding moves a field by less than this, Q16 pixels.
     const SLACK: i32 = 64;
-    let (low, high) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
-    if low > SLACK {
+    if a > SLACK && b > SLACK && c > SLACK && d > SLACK {
         Cover::All
-    } else if high < -SLACK {
+    } else if a < -SLACK && b < -SLACK && c < -SLACK && d < -SLACK {
         Cover::Nothing
     } else {
         Cover::Part

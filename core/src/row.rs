@@ -94,22 +94,6 @@ impl<'w> Walk<'w> {
         NONE
     }
 
-    /// Whether the node's layers are of the same labels as those of `other`.
-    #[inline(always)]
-    fn same(&self, other: &Self) -> bool {
-        let (mut index, mut place) = (self.next, other.next);
-        if self.to.wrapping_sub(index) != other.to.wrapping_sub(place) {
-            return false;
-        }
-        while index < self.to {
-            if self.labels.get(usize::from(index)) != other.labels.get(usize::from(place)) {
-                return false;
-            }
-            (index, place) = (index.wrapping_add(1), place.wrapping_add(1));
-        }
-        true
-    }
-
     /// How many of the next `most` nodes carry a layer of `label` and nothing else, up to the first that does not.
     #[inline(never)]
     fn alone(&self, label: u8, most: usize) -> usize {
@@ -299,15 +283,6 @@ impl Filling<'_, '_> {
             }
             for walk in [&mut before, &mut from, &mut to, &mut after] {
                 walk.step();
-            }
-            let [first, last] = [keys.before.is_none() || from.same(&before), keys.after.is_none() || from.same(&after)];
-            if first && last && from.same(&to) {
-                let mut at = [before.next, from.next, to.next, after.next];
-                while let Some(label) = from.label() {
-                    self.put(label, column as u16, 1, at);
-                    from.next = from.next.wrapping_add(1);
-                    at = at.map(|at| at.wrapping_add(1));
-                }
             }
             while let Some(label) = from.label() {
                 let index = from.next;
