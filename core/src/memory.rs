@@ -4,6 +4,7 @@
 use crate::Bundle;
 use crate::atlas::Texture;
 use crate::coder::{Decoder, Probability};
+use crate::fixed::PlayUv;
 use crate::format::{self, SPACE_CUBIC, TexelKind};
 use crate::key::Key;
 use crate::lists::{self, Lists};
@@ -153,7 +154,7 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, texture: Texture<'m>) -
             edges: 0,
             runs: 0,
             mixes: 0,
-            last: [0; 2],
+            last: [PlayUv::default(); 2],
             strip: None,
             row: 0,
             smooth: 0,

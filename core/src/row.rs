@@ -399,7 +399,9 @@ impl<'m> NodeRow<'m> {
                     let stop = end.min(high).min(low);
                     let length = usize::from(stop.wrapping_sub(column));
                     let (some, rest) = slots.split_at_mut(slots.len().min(length));
-                    let Some(((here, from_rest), (there, to_rest))) = from.split_at_checked(length).zip(to.split_at_checked(length)) else { break };
+                    let Some(((here, from_rest), (there, to_rest))) = from.split_at_checked(length).zip(to.split_at_checked(length)) else {
+                        break;
+                    };
                     middles(some, here, there, above, below);
                     (slots, from, to, column) = (rest, from_rest, to_rest, stop);
                 }

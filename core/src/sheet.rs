@@ -144,7 +144,8 @@ impl Block<'_, '_> {
         let [top, halfway, bottom] = self.rows;
         let [a, b, c] = sheet.nodes;
         let Some([right, lower]) = self.quarter else {
-            return [top.point(a), top.point(a.wrapping_add(1)), bottom.point(c), bottom.point(c.wrapping_add(1))].map(|point| point.at.uv());
+            return [top.point(a), top.point(a.wrapping_add(1)), bottom.point(c), bottom.point(c.wrapping_add(1))]
+                .map(|point| point.at.uv());
         };
         let (above, below) = if lower { ((halfway, b), (bottom, c)) } else { ((top, a), (halfway, b)) };
         let edge = |(row, left): (&NodeRow<'_>, u16)| {
