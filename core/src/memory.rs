@@ -4,6 +4,7 @@
 use crate::Bundle;
 use crate::atlas::Texture;
 use crate::coder::{Decoder, Probability};
+use crate::coverage::Chart;
 use crate::fixed::PlayUv;
 use crate::format::{self, SPACE_CUBIC, TexelKind};
 use crate::key::Key;
@@ -23,6 +24,8 @@ pub struct Workspace<'m> {
     pub texture: Texture<'m>,
     /// The source image's palette in the display's byte order.
     pub palette: &'m mut [u16],
+    /// Every label's chart.
+    pub charts: &'m mut [Chart],
     /// The keys, and what they are decoded with.
     pub stream: Stream<'m>,
     /// The rows of nodes around the current row of cells: the one above that, its upper and its lower edge, the one below.
@@ -118,6 +121,7 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, texture: Texture<'m>) -
     Workspace {
         texture,
         palette: cutter.take(bundle.texel_kind().colours()),
+        charts: cutter.take(bundle.label_count()),
         stream: Stream {
             list_contexts: cutter.take(lists::CONTEXTS),
             key_contexts: cutter.take(nodes::CONTEXTS),

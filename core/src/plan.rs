@@ -8,7 +8,7 @@ use crate::Bundle;
 use crate::atlas::Texture;
 use crate::coverage::{Chart, Cover};
 use crate::fixed::PlayUv;
-use crate::format::{MAX_SHEETS, SPACE_CUBIC, STRIP};
+use crate::format::{MAX_SHEETS, SPACE_CUBIC};
 use crate::lists::{CHART, FIELD};
 use crate::row::Layer;
 use crate::sheet::{Block, Corners, RowSheets, Rows, Sheet, Stretch};
@@ -188,9 +188,18 @@ pub struct Site<'s, 'a, 'm> {
     pub rows: Rows<'s, 'm>,
     /// Its sheets.
     pub sheets: &'s RowSheets<'m>,
+    /// Every label's chart.
+    pub charts: &'s [Chart],
 }
 
 impl Site<'_, '_, '_> {
+    /// The chart of a sheet's label.
+    #[must_use]
+    #[inline(always)]
+    pub fn chart(&self, sheet: &Sheet) -> Chart {
+        self.charts.get(usize::from(sheet.label())).copied().unwrap_or_default()
+    }
+
     /// A block is 2^this pixels wide and high.
     #[must_use]
     pub fn log2(&self) -> u32 {
@@ -458,17 +467,16 @@ fn candidates(site: &Site<'_, '_, '_>, strip: u32, sheets: &[Sheet]) -> [u16; 2]
         let bit = 1u16.wrapping_shl(place as u32);
         let mut covers = [Cover::All; 2];
         if place != last {
-            let record = site.bundle.label(sheet.label());
+            let chart = site.chart(sheet);
             if sheet.test() != CHART {
                 let [first, ..] = &blocks;
                 covers = field_covers(first.field(sheet, 0), cubic, lower);
-                if record.flags & STRIP != 0 {
+                if chart.strip() {
                     let [left, right] = field_covers(first.field(sheet, 1), cubic, lower);
                     covers = [covers[0].and(left), covers[1].and(right)];
                 }
             }
             if sheet.test() != FIELD {
-                let chart = Chart::new(&record);
                 for ((cover, block), open) in covers.iter_mut().zip(&blocks).zip(open) {
                     if open && *cover != Cover::Nothing {
                         *cover = cover.and(chart.cover(&block.corners(sheet)));

@@ -35,7 +35,10 @@ impl<'a, T: Texels> Player<'a, T> {
     /// Those of [`Player::new`]; [`MemoryError::Texels`] says what the bundle needs.
     #[inline]
     pub fn with_texels(bundle: &'a Bundle<'a>, memory: &'a mut [u8]) -> Result<Self, MemoryError> {
-        Ok(Self { playing: T::start(bundle, memory)?, texels: PhantomData })
+        let mut player = Self { playing: T::start(bundle, memory)?, texels: PhantomData };
+        // Here, where what it took to make the player is off the stack again.
+        player.seek(Frame(0));
+        Ok(player)
     }
 
     /// The bundle that plays.

@@ -3,6 +3,7 @@
 
 use crate::atlas::Texture;
 use crate::coder::Decoder;
+use crate::coverage::Chart;
 use crate::draw::{Drawing, Probes};
 use crate::format::{self, SPACE_CUBIC, TexelKind};
 use crate::key::Nothing;
@@ -110,7 +111,7 @@ pub struct Look<'t> {
 }
 
 impl<'a> Playing<'a> {
-    /// Starts at frame 0; `unpack` unpacks a packed source image.
+    /// At no frame yet, before the first `seek`; `unpack` unpacks a packed source image.
     ///
     /// # Errors
     /// [`MemoryError::TooSmall`] where `memory` has fewer bytes than [`Bundle::memory_needed`].
@@ -125,11 +126,13 @@ impl<'a> Playing<'a> {
             return Err(too_small);
         }
         let space = memory::workspace(bundle, memory, unpack).ok_or(too_small)?;
+        for (label, chart) in (0..=u8::MAX).zip(space.charts.iter_mut()) {
+            *chart = Chart::new(&bundle.label(label));
+        }
         let moment = bundle.moment(0);
         let mut playing =
             Self { bundle, space, frame: Frame(0), moment, last: None, coming: None, loaded: None, work: Work::default(), swapped: false };
         playing.set_byte_order(ByteOrder::Native);
-        playing.seek(Frame(0));
         Ok(playing)
     }
 

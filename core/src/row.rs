@@ -481,18 +481,19 @@ impl<'m> NodeRow<'m> {
         None
     }
 
-    /// The fields of layer `index`; those of one that shows everywhere where the bundle has none.
+    /// The fields of layer `index` and of the next one of its chain; those of layers that show everywhere where the bundle has none.
     #[must_use]
-    #[inline]
-    pub fn field(&self, index: u16) -> [i16; 2] {
-        self.field.get(usize::from(index)).copied().unwrap_or([1, 1])
+    #[inline(always)]
+    pub fn fields(&self, index: u16) -> [[i16; 2]; 2] {
+        self.field.get(usize::from(index)..).and_then(<[_]>::first_chunk).copied().unwrap_or([[1, 1]; 2])
     }
 
-    /// Layer `index`, and what is halfway to the next one of its chain.
+    /// Layer `index` and the next one of its chain.
     #[must_use]
-    #[inline]
-    pub fn point(&self, index: u16) -> Point {
-        self.point.get(usize::from(index)).copied().unwrap_or_default()
+    #[inline(always)]
+    pub fn pair(&self, index: u16) -> &[Point; 2] {
+        const NONE: &[Point; 2] = &[Point { at: Layer { u: 0, v: 0 }, middle: Layer { u: 0, v: 0 } }; 2];
+        self.point.get(usize::from(index)..).and_then(<[_]>::first_chunk).unwrap_or(NONE)
     }
 }
 

@@ -144,13 +144,14 @@ impl Block<'_, '_> {
         let [top, halfway, bottom] = self.rows;
         let [a, b, c] = sheet.nodes;
         let Some([right, lower]) = self.quarter else {
-            return [top.point(a), top.point(a.wrapping_add(1)), bottom.point(c), bottom.point(c.wrapping_add(1))]
-                .map(|point| point.at.uv());
+            let edge = |row: &NodeRow<'_>, left: u16| row.pair(left).map(|point| point.at.uv());
+            let ([a, b], [c, d]) = (edge(top, a), edge(bottom, c));
+            return [a, b, c, d];
         };
         let (above, below) = if lower { ((halfway, b), (bottom, c)) } else { ((top, a), (halfway, b)) };
         let edge = |(row, left): (&NodeRow<'_>, u16)| {
-            let point = row.point(left);
-            if right { [point.middle, row.point(left.wrapping_add(1)).at] } else { [point.at, point.middle] }
+            let [from, to] = row.pair(left);
+            if right { [from.middle, to.at] } else { [from.at, from.middle] }
         };
         let ([a, b], [c, d]) = (edge(above), edge(below));
         [a, b, c, d].map(|layer| layer.uv())
@@ -163,6 +164,7 @@ impl Block<'_, '_> {
         let [top, _, bottom] = self.rows;
         let [a, _, c] = sheet.nodes;
         let wide = |fields: [i16; 2]| i32::from(if which == 0 { fields[0] } else { fields[1] }).wrapping_shl(8);
-        [top.field(a), top.field(a.wrapping_add(1)), bottom.field(c), bottom.field(c.wrapping_add(1))].map(wide)
+        let ([a, b], [c, d]) = (top.fields(a), bottom.fields(c));
+        [a, b, c, d].map(wide)
     }
 }

@@ -31,7 +31,7 @@ impl<T: Source> Texels for T {}
 /// What the player asks of kinds of texels. Nothing outside of the crate can name it, so that there are no others.
 // No method is generic: the code of a kind is compiled here, once, whoever plays it.
 pub trait Source {
-    /// A bundle over `memory`, at frame 0; an error where it is of no kind that is played here, or has too little memory.
+    /// A bundle over `memory`, at no frame yet; an error where it is of no kind that is played here, or has too little memory.
     fn start<'a>(bundle: &'a Bundle<'a>, memory: &'a mut [u8]) -> Result<Playing<'a>, MemoryError>;
 
     /// Draws row `y`.
