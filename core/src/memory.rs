@@ -179,16 +179,15 @@ impl Bundle<'_> {
     }
 }
 
-/// `memory` cut up for `bundle`, whose source image `unpack` unpacks if it is packed; `None` where it is too small.
+/// `memory` cut up for `bundle`, whose source image `unpack` unpacks if it is packed; slices of nothing where it is too small.
+#[inline(never)]
 pub fn workspace<'m>(
     bundle: &Bundle<'m>,
     memory: &'m mut [u8],
     unpack: impl Fn(&mut Decoder<'_>, Scratch<'_>, &mut Picture<'_>),
-) -> Option<Workspace<'m>> {
+) -> Workspace<'m> {
     let (_, words, _) = bytemuck::pod_align_to_mut::<u8, u32>(memory);
-    let given = words.len();
     let mut cutter = Cutter::new(words);
     let texture = picture(bundle, &mut cutter, unpack);
-    let workspace = cut(bundle, &mut cutter, texture);
-    (cutter.needed() <= given).then_some(workspace)
+    cut(bundle, &mut cutter, texture)
 }

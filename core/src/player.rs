@@ -35,9 +35,16 @@ impl<'a, T: Texels> Player<'a, T> {
     /// Those of [`Player::new`]; [`MemoryError::Texels`] says what the bundle needs.
     #[inline]
     pub fn with_texels(bundle: &'a Bundle<'a>, memory: &'a mut [u8]) -> Result<Self, MemoryError> {
-        let mut player = Self { playing: T::start(bundle, memory)?, texels: PhantomData };
-        // Here, where what it took to make the player is off the stack again.
-        player.seek(Frame(0));
+        let (needed, given, kind) = (bundle.memory_needed(), memory.len(), bundle.texel_kind());
+        if !T::known(kind) {
+            return Err(MemoryError::Texels { needed: kind });
+        }
+        if given < needed {
+            return Err(MemoryError::TooSmall { needed, given });
+        }
+        let mut player = Self { playing: T::open(bundle, memory), texels: PhantomData };
+        // After what it took to open the bundle is off the stack.
+        player.playing.start();
         Ok(player)
     }
 

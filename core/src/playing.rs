@@ -13,7 +13,7 @@ use crate::record::{Place, SLICE_COST, Shape};
 use crate::row::Around;
 use crate::timeline::Moment;
 use crate::work::{Probe, Work};
-use crate::{Bundle, MemoryError};
+use crate::Bundle;
 
 /// A frame number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Default)]
@@ -111,29 +111,36 @@ pub struct Look<'t> {
 }
 
 impl<'a> Playing<'a> {
-    /// At no frame yet, before the first `seek`; `unpack` unpacks a packed source image.
-    ///
-    /// # Errors
-    /// [`MemoryError::TooSmall`] where `memory` has fewer bytes than [`Bundle::memory_needed`].
+    /// At no frame yet, before the first `seek`, over at least [`Bundle::memory_needed`] bytes of `memory`; `unpack` unpacks a packed source
+    /// image.
+    // What this returns is large: no copy of it may be left on the callers' stack.
+    #[inline(never)]
     pub fn new(
         bundle: &'a Bundle<'a>,
         memory: &'a mut [u8],
         unpack: impl Fn(&mut Decoder<'_>, Scratch<'_>, &mut Picture<'_>),
-    ) -> Result<Self, MemoryError> {
-        let (needed, given) = (bundle.memory_needed(), memory.len());
-        let too_small = MemoryError::TooSmall { needed, given };
-        if given < needed {
-            return Err(too_small);
+    ) -> Self {
+        Self {
+            bundle,
+            space: memory::workspace(bundle, memory, unpack),
+            frame: Frame(0),
+            moment: bundle.moment(0),
+            last: None,
+            coming: None,
+            loaded: None,
+            work: Work::default(),
+            swapped: false,
         }
-        let space = memory::workspace(bundle, memory, unpack).ok_or(too_small)?;
-        for (label, chart) in (0..=u8::MAX).zip(space.charts.iter_mut()) {
-            *chart = Chart::new(&bundle.label(label));
+    }
+
+    /// Makes ready what does not change from frame to frame, and frame 0 the current one.
+    #[inline(never)]
+    pub fn start(&mut self) {
+        for (label, chart) in (0..=u8::MAX).zip(self.space.charts.iter_mut()) {
+            *chart = Chart::new(&self.bundle.label(label));
         }
-        let moment = bundle.moment(0);
-        let mut playing =
-            Self { bundle, space, frame: Frame(0), moment, last: None, coming: None, loaded: None, work: Work::default(), swapped: false };
-        playing.set_byte_order(ByteOrder::Native);
-        Ok(playing)
+        self.set_byte_order(ByteOrder::Native);
+        self.seek(Frame(0));
     }
 
     /// The bundle that plays.
