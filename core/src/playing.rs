@@ -1,6 +1,7 @@
 //! Playing, whatever the texels are: keys are decoded into the caller's memory by `seek`, rows of cells made ready to be drawn.
 //! `player` is what callers see of it, `texels` what pixels are made by.
 
+use crate::Bundle;
 use crate::atlas::Texture;
 use crate::coder::Decoder;
 use crate::coverage::Chart;
@@ -13,7 +14,6 @@ use crate::record::{Place, SLICE_COST, Shape};
 use crate::row::Around;
 use crate::timeline::Moment;
 use crate::work::{Probe, Work};
-use crate::Bundle;
 
 /// A frame number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Default)]
@@ -115,11 +115,7 @@ impl<'a> Playing<'a> {
     /// image.
     // What this returns is large: no copy of it may be left on the callers' stack.
     #[inline(never)]
-    pub fn new(
-        bundle: &'a Bundle<'a>,
-        memory: &'a mut [u8],
-        unpack: impl Fn(&mut Decoder<'_>, Scratch<'_>, &mut Picture<'_>),
-    ) -> Self {
+    pub fn new(bundle: &'a Bundle<'a>, memory: &'a mut [u8], unpack: impl Fn(&mut Decoder<'_>, Scratch<'_>, &mut Picture<'_>)) -> Self {
         Self {
             bundle,
             space: memory::workspace(bundle, memory, unpack),

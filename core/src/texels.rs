@@ -12,6 +12,7 @@
 //! }
 //! ```
 
+use crate::Bundle;
 use crate::atlas::Texture;
 use crate::coder::Decoder;
 use crate::draw::{Paint, mean};
@@ -21,7 +22,6 @@ use crate::pack::{self, Picture, Scratch};
 use crate::plan::{self, Edge, Run};
 use crate::playing::{Look, Playing};
 use crate::span::{self, Packed};
-use crate::Bundle;
 
 /// A kind of texels, or several, that a [`crate::Player`] plays: [`Indexed8`], [`Indexed4`], [`Direct565`] or [`AnyTexels`].
 pub trait Texels: Source {}
