@@ -113,13 +113,22 @@ fn collect(sheets: SheetsRef<'_>, found: &mut Vec<Found, MAX_NODE_LAYERS>) {
         let tested = sheets.test(index) != CHART;
         // A few at most: a walk finds the place as fast as any search.
         let at = found.iter().take_while(|other| other.label < label).count();
+        let full = found.is_full();
         match found.get_mut(at) {
             Some(other) if other.label == label => {
                 other.support = other.support.saturating_add(1);
                 other.tested |= tested;
             }
             // Labels past the bound of a node are left out; its cells do without them.
-            _ => drop(found.insert(at, Found { label, support: 1, tested })),
+            _ if full => {}
+            _ => {
+                // Each makes room for the one before it.
+                let mut moved = Found { label, support: 1, tested };
+                for slot in found.iter_mut().skip(at) {
+                    core::mem::swap(slot, &mut moved);
+                }
+                let _ = found.push(moved);
+            }
         }
     }
 }
