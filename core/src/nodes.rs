@@ -19,7 +19,6 @@ pub const CONTEXTS: usize = predict::CONTEXTS + field::CONTEXTS;
 
 /// Codes the layers of one `row` of a key's nodes into `target`, which holds those of the rows above, in `contexts` ([`CONTEXTS`] of
 /// them). `traces` holds two rows of nodes' worth of [`Trace`]s, half of it each.
-#[inline(never)]
 pub fn code_row<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
     bits: &mut B,
     contexts: &mut [Probability],

@@ -22,8 +22,6 @@ pub const CONTEXTS: usize = SUPPORT_CLASSES * NOISE_CLASSES * 2 * NUMBER_CONTEXT
 
 /// Codes the position of the layer at `spot` in `contexts` ([`CONTEXTS`] of them): the best prediction, and a residual. `support` of the
 /// cells around the node show its label. Its trace joins `traces`.
-// A function of its own: what it takes of the stack is gone again when fields are coded.
-#[inline(never)]
 #[expect(clippy::too_many_arguments, reason = "the key's state, its memory and the layer's place are three different owners")]
 pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
     bits: &mut B,
