@@ -5,7 +5,7 @@ use crate::Bundle;
 use crate::fixed::PlayUv;
 use crate::lists::{CHART, FIELD};
 use crate::memory::Workspace;
-use crate::plan::{self, Edge, Mixed, Plan, Run, Site};
+use crate::plan::{Edge, Mixed, Plan, Run, Site};
 use crate::span::{self, Field, Packed, Span};
 use crate::work::{Probe, Work};
 
@@ -37,12 +37,7 @@ impl Paint for Probes {
 
     fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [Probe], log2: u32) {
         let label = run.label as u8;
-        let make = |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(run.row) };
-        if plan::short(WIDTH, log2) {
-            span::run(edges, out, make);
-        } else {
-            span::any_run(edges, out, log2, make);
-        }
+        span::any_run(edges, out, log2, |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(run.row) });
     }
 }
 
@@ -89,16 +84,14 @@ impl<'d, 'a> Drawing<'d, 'a> {
         let drawn = out.len().min(width);
         let out = out.get_mut(..drawn).unwrap_or(&mut []);
         let Plan { edge, run: runs, runs: count, .. } = &mut *self.plan;
-        let width_log2 = self.site.texture.width_log2;
-        let more = if plan::short(width_log2, log2) { 0 } else { 1usize };
         for &run in runs.get(..*count).unwrap_or(&[]) {
-            let edges = edge.get_mut(usize::from(run.edge)..).and_then(|edges| edges.get_mut(..usize::from(run.blocks).wrapping_add(more)));
-            let Some(edges) = edges else { continue };
+            let first = usize::from(run.edge);
+            let Some(edges) = edge.get_mut(first..=first.wrapping_add(run.blocks.into())) else { continue };
             let from = usize::from(run.block).wrapping_shl(log2);
             let to = usize::from(run.block).wrapping_add(run.blocks.into()).wrapping_shl(log2);
             match out.get_mut(from..to) {
-                Some(pixels) => by_width(paint, run, edges, pixels, log2, width_log2),
-                None => cut(paint, run, edges, out, log2, width_log2),
+                Some(pixels) => by_width(paint, run, edges, pixels, log2, self.site.bundle.texture().width_log2),
+                None => cut(paint, run, edges, out, log2, self.site.bundle.texture().width_log2),
             }
         }
         self.plan.row = row.wrapping_add(1);
@@ -179,9 +172,8 @@ fn cut<P: Paint>(paint: &P, run: Run, edges: &mut [Edge], out: &mut [P::Pixel], 
     for index in 0..usize::from(run.blocks) {
         let (pixels, rest) = out.split_at_mut(out.len().min(1 << log2));
         out = rest;
-        // Copies: an edge may belong to two blocks, and is stepped once. Who wants one a block, takes the first.
-        let Some(&left) = edges.get(index) else { break };
-        let right = edges.get(index.wrapping_add(1)).copied().unwrap_or_default();
+        // Copies: an edge belongs to two blocks, and is stepped once.
+        let Some(&[left, right]) = edges.get(index..).and_then(<[Edge]>::first_chunk::<2>) else { break };
         let mut whole = [P::Pixel::default(); 32];
         if let Some(block) = whole.get_mut(..1 << log2) {
             by_width(paint, run, &mut [left, right], block, log2, width_log2);

@@ -5,7 +5,6 @@ use crate::Bundle;
 use crate::atlas::Texture;
 use crate::coder::{Decoder, Probability};
 use crate::coverage::Chart;
-use crate::fixed::PlayUv;
 use crate::format::{self, SPACE_CUBIC, TexelKind};
 use crate::key::Key;
 use crate::lists::{self, Lists};
@@ -158,7 +157,7 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, texture: Texture<'m>) -
             edges: 0,
             runs: 0,
             mixes: 0,
-            last: [PlayUv::default(); 2],
+            last: [0; 2],
             strip: None,
             row: 0,
             smooth: 0,

@@ -13,34 +13,29 @@ use crate::lists::{CHART, FIELD};
 use crate::row::Layer;
 use crate::sheet::{Block, Corners, RowSheets, Rows, Sheet, Stretch};
 
-/// Two numbers at the strip's current row, and how far each goes from row to row, in caller's memory. Of a run whose blocks are four pixels wide in
-/// a picture 512 wide ([`short`]) every block has them: the packed position at its left side, and the step from pixel to pixel. Of any other
-/// every side of a block has them: its position, where u counts the picture's width as 2^32, v its window's rows as 2^31.
+/// A side of a block in a run, in caller's memory: where it stands at the strip's current row, and how far that is from row to row.
+/// u counts the picture's width as 2^32, v its window's rows as 2^31.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Edge {
-    /// The numbers.
-    at: [u32; 2],
-    /// A row further.
-    down: [u32; 2],
+    /// Across.
+    pub u: u32,
+    /// Down.
+    pub v: u32,
+    /// A row further: across.
+    pub down_u: u32,
+    /// A row further: down.
+    pub down_v: u32,
 }
 
 impl Edge {
-    /// Steps to the next row; returns what it was.
+    /// Steps to the next row; returns where it was.
     #[inline(always)]
     pub const fn advance(&mut self) -> [u32; 2] {
-        let was = self.at;
-        self.at = [was[0].wrapping_add(self.down[0]), was[1].wrapping_add(self.down[1])];
+        let was = [self.u, self.v];
+        (self.u, self.v) = (self.u.wrapping_add(self.down_u), self.v.wrapping_add(self.down_v));
         was
     }
-}
-
-/// Whether runs of blocks of 2^`log2` pixels in pictures 2^`width_log2` wide have an [`Edge`] a block; others have one more.
-// Most are of this kind; in larger blocks the steps' rounding would add up.
-#[must_use]
-#[inline(always)]
-pub const fn short(width_log2: u32, log2: u32) -> bool {
-    width_log2 == 9 && log2 == 2
 }
 
 /// Neighbouring blocks that show one sheet of one label, in caller's memory.
@@ -49,7 +44,7 @@ pub const fn short(width_log2: u32, log2: u32) -> bool {
 pub struct Run {
     /// The first block, from the left.
     pub block: u16,
-    /// How many there are.
+    /// How many there are. They have one edge more.
     pub blocks: u16,
     /// The first edge.
     pub edge: u16,
@@ -107,34 +102,12 @@ impl Window {
         let (shift_u, shift_v) = (self.shift_u(), self.shift_v());
         let [half_u, half_v] = halves(self.width_log2, self.rows_log2);
         // Both shifts are at least 5: the steps lose nothing.
-        let u = (above.u as u32).wrapping_shl(shift_u).wrapping_add(half_u);
-        let v = (above.v as u32).wrapping_sub(row.wrapping_shl(16)).wrapping_shl(shift_v).wrapping_add(half_v);
-        let down_u = (below.u.wrapping_sub(above.u) as u32).wrapping_shl(shift_u.wrapping_sub(log2));
-        let down_v = (below.v.wrapping_sub(above.v) as u32).wrapping_shl(shift_v.wrapping_sub(log2));
-        Edge { at: [u, v], down: [down_u, down_v] }
-    }
-}
-
-/// A block of four by four pixels with these corners, in a window of 32 rows from `row` on of a picture 512 wide: see [`short`].
-/// Everything is rounded to the nearest of 512 steps a texel. At the last row and pixel that is at most half a step of the position, three
-/// times half a one of what it goes down, and three times that of the step: 8 in all.
-#[inline(always)]
-const fn block([a, b, c, d]: Corners, row: u32) -> Edge {
-    const STEP: u32 = 7;
-    const fn packed(u: i32, v: i32, drop: u32) -> u32 {
-        let half = (1i32 << drop) >> 1;
-        let (u, v) = (u.wrapping_add(half) >> drop, v.wrapping_add(half) >> drop);
-        (u as u32).wrapping_shl(14).wrapping_add(v as u32)
-    }
-    const fn between(from: PlayUv, to: PlayUv) -> PlayUv {
-        PlayUv { u: to.u.wrapping_sub(from.u), v: to.v.wrapping_sub(from.v) }
-    }
-    let (across, down, beside) = (between(a, b), between(a, c), between(b, d));
-    let bend = between(down, beside);
-    let top = row.wrapping_shl(16) as i32;
-    Edge {
-        at: [packed(a.u, a.v.wrapping_sub(top), STEP), packed(across.u, across.v, STEP + 2)],
-        down: [packed(down.u, down.v, STEP + 2), packed(bend.u, bend.v, STEP + 4)],
+        Edge {
+            u: (above.u as u32).wrapping_shl(shift_u).wrapping_add(half_u),
+            v: (above.v as u32).wrapping_sub(row.wrapping_shl(16)).wrapping_shl(shift_v).wrapping_add(half_v),
+            down_u: (below.u.wrapping_sub(above.u) as u32).wrapping_shl(shift_u.wrapping_sub(log2)),
+            down_v: (below.v.wrapping_sub(above.v) as u32).wrapping_shl(shift_v.wrapping_sub(log2)),
+        }
     }
 }
 
@@ -146,7 +119,7 @@ pub const fn halves(width_log2: u32, rows_log2: u32) -> [u32; 2] {
 }
 
 /// Positions in runs keep this far from the edges of picture and window, Q16 texels: more than rounding moves them.
-const MARGIN: i32 = 1 << 11;
+const MARGIN: i32 = 1 << 10;
 
 /// A strip's blocks, in caller's memory.
 #[derive(Debug)]
@@ -163,8 +136,8 @@ pub struct Plan<'m> {
     pub runs: usize,
     /// Mixed blocks.
     pub mixes: usize,
-    /// The right side of the last run's last block: above, below.
-    pub last: [PlayUv; 2],
+    /// Where the last edge's ends are across, Q16 texels: above, below.
+    pub last: [i32; 2],
     /// The strip it is about; none: nothing yet.
     pub strip: Option<u32>,
     /// The row of the strip at which the edges stand.
@@ -259,11 +232,13 @@ impl Plan<'_> {
         let before = across.left;
         let mut along = 0u16;
         while along < stretch.cells && across.left < width {
-            // Most of most pictures; others go by `append` alone. Likewise the cell that the screen's edge cuts.
-            if window.is_some_and(|window| short(window.width_log2, log2)) && site.cubic() {
+            // In pictures 512 wide, as most are; others go by `append` alone. Likewise the cell that the screen's edge cuts.
+            if let Some(Window { width_log2: 9, .. }) = window
+                && site.cubic()
+            {
                 let most = (width.saturating_sub(across.left) >> log2 >> 1).min(stretch.cells.wrapping_sub(along).into());
                 let rest = lines.map(|line| line.get(usize::from(along).wrapping_mul(2)..).unwrap_or(&[]));
-                let cells = self.extend(across.block, most as usize, sheet.label(), rest);
+                let cells = self.extend(across.block, most as usize, sheet.label(), rest, log2);
                 along = along.wrapping_add(cells);
                 across.block = across.block.wrapping_add(u32::from(cells).wrapping_mul(2));
                 across.left = across.block.wrapping_shl(log2);
@@ -305,37 +280,37 @@ impl Plan<'_> {
     /// Appends smooth cells, the first of which begins with block `block`, to the last run, both blocks of each, as long as they follow it and fit
     /// into its window, `most` at most; returns how many. `above` and `below` start at their left corners.
     #[inline(never)]
-    fn extend(&mut self, block: u32, most: usize, label: u8, [above, below]: [&[Layer]; 2]) -> u16 {
+    fn extend(&mut self, block: u32, most: usize, label: u8, [above, below]: [&[Layer]; 2], log2: u32) -> u16 {
         let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return 0 };
-        if run.label != u16::from(label) || u32::from(run.block).wrapping_add(run.blocks.into()) != block {
+        if run.label != u16::from(label) || u32::from(run.block).wrapping_add(u32::from(run.blocks)) != block {
             return 0;
         }
         let (Some((_, above)), Some((_, below))) = (above.split_first(), below.split_first()) else { return 0 };
         let Some(edges) = self.edge.get_mut(self.edges..) else { return 0 };
+        let window = Window { width_log2: 9, rows_log2: 5 };
         let row = u32::from(run.row);
         let least = (row as i32).wrapping_shl(16).wrapping_add(MARGIN);
-        const ACROSS: u32 = 1 << 25;
-        const WIDE: u32 = ACROSS - 2 * MARGIN as u32;
-        const HIGH: u32 = (1 << 21) - 2 * MARGIN as u32;
+        let [across, down] = [window.width_log2, window.rows_log2].map(|log2| 1u32.wrapping_shl(log2.wrapping_add(16)));
+        let [wide, high] = [across, down].map(|size| size.wrapping_sub((2 * MARGIN) as u32));
         let [mut from, mut to] = self.last;
         let mut done = 0usize;
         for ((edge, a), b) in edges.iter_mut().zip(above).zip(below).take(most.wrapping_mul(2)) {
             let (a, b) = (a.uv(), b.uv());
             // As in `append`: steps across of less than half the width, which is a power of two.
-            let [near, far] = [a.u.wrapping_sub(from.u), b.u.wrapping_sub(to.u)].map(|step| step.wrapping_add((ACROSS >> 1) as i32) as u32);
-            let inside = (a.u.wrapping_sub(MARGIN) as u32) < WIDE && (b.u.wrapping_sub(MARGIN) as u32) < WIDE && (near | far) < ACROSS;
-            if !(inside && (a.v.wrapping_sub(least) as u32) < HIGH && (b.v.wrapping_sub(least) as u32) < HIGH) {
+            let [near, far] = [a.u.wrapping_sub(from), b.u.wrapping_sub(to)].map(|step| step.wrapping_add((across >> 1) as i32) as u32);
+            let inside = (a.u.wrapping_sub(MARGIN) as u32) < wide && (b.u.wrapping_sub(MARGIN) as u32) < wide && (near | far) < across;
+            if !(inside && (a.v.wrapping_sub(least) as u32) < high && (b.v.wrapping_sub(least) as u32) < high) {
                 break;
             }
-            *edge = self::block([from, a, to, b], row);
-            (from, to) = (a, b);
+            *edge = window.edge(a, b, row, log2);
+            (from, to) = (a.u, b.u);
             done = done.wrapping_add(1);
         }
         if done & 1 == 1 {
             // Half a cell is for `append`, which finds the same.
             done = done.wrapping_sub(1);
             let before =
-                |line: &[Layer], known: PlayUv| done.checked_sub(1).and_then(|last| line.get(last)).map_or(known, |layer| layer.uv());
+                |line: &[Layer], known: i32| done.checked_sub(1).and_then(|last| line.get(last)).map_or(known, |layer| layer.uv().u);
             let [a, b] = self.last;
             (from, to) = (before(above, a), before(below, b));
         }
@@ -375,11 +350,10 @@ impl Plan<'_> {
             && within(run.row, b)
             && within(run.row, d)
         {
-            let row = u32::from(run.row);
-            *slot = if short(window.width_log2, log2) { self::block(corners, row) } else { window.edge(b, d, row, log2) };
+            *slot = window.edge(b, d, run.row.into(), log2);
             run.blocks = run.blocks.wrapping_add(1);
             self.edges = self.edges.wrapping_add(1);
-            self.last = [b, d];
+            self.last = [b.u, d.u];
             return true;
         }
         if !(inside(a.u, width) && inside(c.u, width)) {
@@ -399,16 +373,11 @@ impl Plan<'_> {
         }
         let after = self.edges.wrapping_add(2);
         let (Some(slot), Some([left, right])) = (self.run.get_mut(self.runs), self.edge.get_mut(self.edges..after)) else { return false };
+        *left = window.edge(a, c, row.into(), log2);
+        *right = window.edge(b, d, row.into(), log2);
         *slot = Run { block, blocks: 1, edge: self.edges as u16, row, label };
         (self.edges, self.runs) = (after, self.runs.wrapping_add(1));
-        if short(window.width_log2, log2) {
-            *left = self::block(corners, row.into());
-            self.edges = self.edges.wrapping_sub(1);
-        } else {
-            *left = window.edge(a, c, row.into(), log2);
-            *right = window.edge(b, d, row.into(), log2);
-        }
-        self.last = [b, d];
+        self.last = [b.u, d.u];
         true
     }
 

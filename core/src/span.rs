@@ -53,19 +53,28 @@ impl<const WIDTH: u32, const ROWS: u32> Packed<WIDTH, ROWS> {
     }
 }
 
-/// Paints `out`, a run's blocks of four pixels each, and steps them down a row: for runs that are [`crate::plan::short`].
+/// Paints `out`, a run's blocks of `PIXELS` pixels each, and steps its edges down a row.
 #[inline(always)]
-pub fn run<T, const WIDTH: u32, const ROWS: u32>(blocks: &mut [Edge], out: &mut [T], make: impl Fn(Packed<WIDTH, ROWS>) -> T) {
-    for (block, pixels) in blocks.iter_mut().zip(out.as_chunks_mut::<4>().0) {
-        let [mut at, step] = block.advance();
+pub fn run<T, const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(
+    edges: &mut [Edge],
+    out: &mut [T],
+    make: impl Fn(Packed<WIDTH, ROWS>) -> T,
+) {
+    let mut edges = edges.iter_mut();
+    let Some(mut left) = edges.next().map(Edge::advance) else { return };
+    for (edge, pixels) in edges.zip(out.as_chunks_mut::<PIXELS>().0) {
+        let right = edge.advance();
+        let step = Packed::<WIDTH, ROWS>::step(left, right, PIXELS.trailing_zeros());
+        let Packed(mut at) = Packed::<WIDTH, ROWS>::new(left);
         for pixel in pixels {
             *pixel = make(Packed(at));
             at = at.wrapping_add(step);
         }
+        left = right;
     }
 }
 
-/// Like [`run`], with blocks of any 2^`log2` pixels and an edge at every side: every four the position is packed anew, so that steps' rounding does not add up.
+/// Like [`run`], with blocks of any 2^`log2` pixels: every four the position is packed anew, so that steps' rounding does not add up.
 #[inline(always)]
 pub fn any_run<T, const WIDTH: u32, const ROWS: u32>(
     edges: &mut [Edge],

@@ -19,7 +19,7 @@ use crate::draw::{Paint, mean};
 use crate::fixed::PlayUv;
 use crate::format::TexelKind;
 use crate::pack::{self, Picture, Scratch};
-use crate::plan::{self, Edge, Run};
+use crate::plan::{Edge, Run};
 use crate::playing::{Look, Playing};
 use crate::span::{self, Packed};
 
@@ -144,8 +144,9 @@ impl Paint for Colours8<'_> {
 /// A run's pixels.
 #[inline(always)]
 fn paint_run<const WIDTH: u32, const ROWS: u32>(edges: &mut [Edge], out: &mut [u16], log2: u32, make: impl Fn(Packed<WIDTH, ROWS>) -> u16) {
-    if plan::short(WIDTH, log2) {
-        span::run(edges, out, make);
+    // Blocks of four in a picture 512 wide are the rule, and have a loop of their own.
+    if (WIDTH, log2) == (9, 2) {
+        span::run::<_, WIDTH, ROWS, 4>(edges, out, make);
     } else {
         span::any_run(edges, out, log2, make);
     }

@@ -6,9 +6,7 @@
 //! - the left and the right end of a span downwards: 1 / 2^16;
 //! - the step along it to nearest: (cell - 1) / 2^17 at its last pixel.
 //! - where one sheet shows, positions are packed for every four pixels, to the nearest of 512 steps a texel in a picture 512 texels wide, of
-//!   256 in one half or twice as wide, and so is the step along them: half a step each, at the last of the four 2 / 512 or 2 / 256 texel;
-//! - where blocks are four pixels wide and the picture 512, that is done once for the block's four rows, with what both change from row to row:
-//!   in the last row 2 / 512 texel each, at the last of the four pixels 8 / 512.
+//!   256 in one half or twice as wide, and so is the step along them: half a step each, at the last of the four 2 / 512 or 2 / 256 texel.
 //!
 //! Where space is cubic, a span is half a cell long, and a value halfway between others is rounded downwards, to at most 1 / 2^16 less,
 //! and up to 5/4 as far off as these: after two such steps, down and across, 6 / 2^17 instead of the layer's 1 / 2^17.
@@ -67,9 +65,7 @@ impl Found {
 /// The bounds of one pixel: on positions, texels, and on fields, pixels.
 fn bounds(pixel: &Pixel, cell: u32, space: u8, width_log2: u32, weights: Weights) -> [f64; 2] {
     let unit = 1.0 / f64::from(1u32 << 17);
-    let block = if space == SPACE_CUBIC { cell / 2 } else { cell };
     let packed = match width_log2 {
-        9 if block == 4 => 8.0 / 512.0,
         9 => 2.0 / 512.0,
         8 | 10 => 2.0 / 256.0,
         // No runs there.
