@@ -212,3 +212,24 @@ impl View {
         Some([axis(u)?, axis(v)?])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{LIMIT, Quotient};
+
+    #[test]
+    fn quotients_are_those_of_a_long_division() {
+        let mut seed = 7u64;
+        let mut next = |bits: u32| {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            seed >> (64 - bits)
+        };
+        for round in 0..20_000u32 {
+            let divisor = next(1 + round % 45).max(1);
+            let exact = next(18);
+            let numerator = exact * divisor + next(46) % divisor;
+            let quotient = Quotient::new(divisor).of(numerator).filter(|&quotient| quotient < LIMIT);
+            assert_eq!(quotient.map(u64::from), Some(exact).filter(|&exact| exact < u64::from(LIMIT)), "{numerator} / {divisor}");
+        }
+    }
+}
