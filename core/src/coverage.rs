@@ -4,7 +4,7 @@
 
 use crate::atlas::Texture;
 use crate::fixed::{PLAY_BITS, PlayUv};
-use crate::format::{LabelRecord, MASKED};
+use crate::format::{LabelRecord, MASKED, STRIP};
 
 /// How much of something a sheet covers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -29,29 +29,36 @@ impl Cover {
     }
 }
 
-/// A label's chart, ready for testing.
-#[derive(Clone, Copy, Debug)]
+/// A label's chart, ready for testing, in caller's memory.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
 pub struct Chart {
     left: i32,
     top: i32,
     right: i32,
     bottom: i32,
-    masked: bool,
+    /// The label's.
+    flags: u32,
 }
 
 impl Chart {
     /// The chart of `label`.
     #[must_use]
-    #[inline]
     pub fn new(label: &LabelRecord) -> Self {
         let edge = |texel: u16| i32::from(texel).wrapping_shl(PLAY_BITS);
-        Self {
-            left: edge(label.left),
-            top: edge(label.top),
-            right: edge(label.right),
-            bottom: edge(label.bottom),
-            masked: label.flags & MASKED != 0,
-        }
+        let LabelRecord { left, top, right, bottom, flags, .. } = *label;
+        Self { left: edge(left), top: edge(top), right: edge(right), bottom: edge(bottom), flags: flags.into() }
+    }
+
+    /// The label's outline is told by two fields.
+    #[must_use]
+    #[inline]
+    pub const fn strip(&self) -> bool {
+        self.flags & STRIP as u32 != 0
+    }
+
+    const fn masked(&self) -> bool {
+        self.flags & MASKED as u32 != 0
     }
 
     /// Whether `uv` falls inside the chart.
@@ -59,7 +66,7 @@ impl Chart {
     #[inline]
     pub fn covers(&self, uv: PlayUv, texture: &Texture<'_>) -> bool {
         let inside = uv.u >= self.left && uv.u < self.right && uv.v >= self.top && uv.v < self.bottom;
-        inside && (!self.masked || texture.covered(uv))
+        inside && (!self.masked() || texture.covered(uv))
     }
 
     /// How much the chart covers of what lies between `points`, with some room for rounding.
@@ -81,6 +88,6 @@ impl Chart {
         const TWICE: i32 = 2 * SLACK;
         let across = low[0] >= left.wrapping_add(TWICE) && high[0] < right.wrapping_sub(TWICE);
         let down = low[1] >= top.wrapping_add(TWICE) && high[1] < bottom.wrapping_sub(TWICE);
-        if across && down && !self.masked { Cover::All } else { Cover::Part }
+        if across && down && !self.masked() { Cover::All } else { Cover::Part }
     }
 }

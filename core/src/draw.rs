@@ -2,9 +2,7 @@
 //! The plan is in the caller's memory; pixels go to the caller's row, as `player` asks.
 
 use crate::Bundle;
-use crate::coverage::Chart;
 use crate::fixed::PlayUv;
-use crate::format::{LabelRecord, STRIP};
 use crate::lists::{CHART, FIELD};
 use crate::memory::Workspace;
 use crate::plan::{Edge, Mixed, Plan, Run, Site};
@@ -56,8 +54,8 @@ impl<'d, 'a> Drawing<'d, 'a> {
     where
         'a: 'd,
     {
-        let Workspace { texture, rows: [_, top, bottom, _], halfway, sheets, plan, palette, .. } = space;
-        let site = Site { bundle, texture: *texture, rows: [top, halfway, bottom], sheets };
+        let Workspace { texture, rows: [_, top, bottom, _], halfway, sheets, charts, plan, palette, .. } = space;
+        let site = Site { bundle, texture: *texture, rows: [top, halfway, bottom], sheets, charts };
         (Self { site, plan }, palette)
     }
 
@@ -229,11 +227,11 @@ fn block<P: Paint, const EIGHT: bool>(
     while sheets != 0 && left != 0 {
         let place = usize::from(mixed.sheet).wrapping_add(sheets.trailing_zeros() as usize);
         sheets &= sheets.wrapping_sub(1);
-        let Some(sheet) = site.sheets.sheet.get(place) else { break };
+        let Some(sheet) = site.sheets.sheet.get(place).map(|sheet| sheet.further(mixed.along)) else { break };
+        let sheet = &sheet;
         let mut shown = left;
         // The last one covers what is left.
         let tested = sheets != 0;
-        let record = if tested { site.bundle.label(sheet.label()) } else { LabelRecord::default() };
         if tested && sheet.test() != CHART {
             let step = y & (1u32 << cell).wrapping_sub(1);
             let first = u32::from(mixed.block).wrapping_shl(log2) & (1u32 << cell).wrapping_sub(1);
@@ -246,7 +244,7 @@ fn block<P: Paint, const EIGHT: bool>(
                 .positive(pixels.len())
             };
             shown &= positive(0);
-            if record.flags & STRIP != 0 {
+            if site.chart(sheet).strip() {
                 shown &= positive(1);
             }
         }
@@ -258,7 +256,7 @@ fn block<P: Paint, const EIGHT: bool>(
             Some(beside) => Span::beside(block.corners(sheet), row, log2, beside),
         };
         if tested && sheet.test() != FIELD {
-            shown = span::inside(&Chart::new(&record), shown, pixels.len(), span, &texture);
+            shown = span::inside(&site.chart(sheet), shown, pixels.len(), span, &texture);
         }
         if shown != 0 {
             span::paint(pixels, shown, span, &texture, |uv| paint.at(uv, sheet.label()));

@@ -93,6 +93,14 @@ impl<'m> Lists<'m> {
         SheetsRef { labels, tests }
     }
 
+    /// How many cells from `cursor` on list `label` and no other, `most` at most, and where the one after them is.
+    #[must_use]
+    pub fn alike(&self, cursor: Cursor, label: u8, most: usize) -> (usize, Cursor) {
+        let (cells, _) = self.data.get(cursor.at..).unwrap_or(&[]).as_chunks::<2>();
+        let alike = cells.iter().take(most).take_while(|&&cell| cell == [1, label]).count();
+        (alike, Cursor { at: cursor.at.saturating_add(alike.saturating_mul(bytes(1))) })
+    }
+
     fn push(&mut self, end: usize, sheets: &Sheets) -> usize {
         let labels = sheets.labels.get(..self.most).unwrap_or(&sheets.labels);
         let next = end.saturating_add(bytes(labels.len()));
@@ -125,6 +133,12 @@ pub struct Cursor {
 
 impl Cursor {
     const NOWHERE: Self = Self { at: usize::MAX };
+
+    /// The cell to the right of one whose sheets are `sheets`.
+    #[must_use]
+    pub fn past(self, sheets: SheetsRef<'_>) -> Self {
+        Self { at: self.at.saturating_add(bytes(sheets.labels.len())) }
+    }
 
     /// The cell to the right.
     #[must_use]

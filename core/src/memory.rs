@@ -4,6 +4,7 @@
 use crate::Bundle;
 use crate::atlas::Texture;
 use crate::coder::{Decoder, Probability};
+use crate::coverage::Chart;
 use crate::format::{self, SPACE_CUBIC, TexelKind};
 use crate::key::Key;
 use crate::lists::{self, Lists};
@@ -11,8 +12,8 @@ use crate::nodes;
 use crate::pack::{self, Picture, Recent, Scratch};
 use crate::plan::{Edge, Mixed, Plan, Run};
 use crate::record::Stream;
-use crate::row::{Layer, NodeRow};
-use crate::sheet::{RowSheets, Sheet};
+use crate::row::{Chain, NodeRow, Piece, Point};
+use crate::sheet::{RowSheets, Sheet, Stretch};
 use bytemuck::Pod;
 
 /// The caller's memory, cut up.
@@ -22,6 +23,8 @@ pub struct Workspace<'m> {
     pub texture: Texture<'m>,
     /// The source image's palette in the display's byte order.
     pub palette: &'m mut [u16],
+    /// Every label's chart.
+    pub charts: &'m mut [Chart],
     /// The keys, and what they are decoded with.
     pub stream: Stream<'m>,
     /// The rows of nodes around the current row of cells: the one above that, its upper and its lower edge, the one below.
@@ -29,6 +32,8 @@ pub struct Workspace<'m> {
     pub rows: [NodeRow<'m>; 4],
     /// Where space is cubic, what lies halfway down the row of cells.
     pub halfway: NodeRow<'m>,
+    /// What a row of nodes is put together from.
+    pub pieces: &'m mut [Piece],
     /// The sheets of the current row of cells.
     pub sheets: RowSheets<'m>,
     /// What the current strip of it shows.
@@ -104,17 +109,18 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, texture: Texture<'m>) -
     let node_row = |cutter: &mut Cutter<'m>, wanted: bool, fields: bool| {
         let if_wanted = |count: usize| if wanted { count } else { 0 };
         NodeRow {
-            start: cutter.take(if_wanted(one_more(grid.node_columns()))),
-            label: cutter.take(if_wanted(row_layers)),
-            layer: cutter.take::<Layer>(if_wanted(row_layers)),
-            right: cutter.take(if_wanted(row_layers)),
-            middle: cutter.take::<Layer>(if cubic { if_wanted(row_layers) } else { 0 }),
+            chain: cutter.take::<Chain>(if_wanted(row_layers)),
+            chains: 0,
+            head: cutter.take(if_wanted(bundle.label_count())),
+            point: cutter.take::<Point>(if_wanted(row_layers)),
+            cubic,
             field: cutter.take::<[i16; 2]>(if fields { if_wanted(row_layers) } else { 0 }),
         }
     };
     Workspace {
         texture,
         palette: cutter.take(bundle.texel_kind().colours()),
+        charts: cutter.take(bundle.label_count()),
         stream: Stream {
             list_contexts: cutter.take(lists::CONTEXTS),
             key_contexts: cutter.take(nodes::CONTEXTS),
@@ -141,7 +147,8 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, texture: Texture<'m>) -
         },
         rows: core::array::from_fn(|row| node_row(cutter, cubic || row == 1 || row == 2, fields > 0)),
         halfway: node_row(cutter, cubic, false),
-        sheets: RowSheets { start: cutter.take(one_more(grid.columns)), sheet: cutter.take::<Sheet>(row_sheets) },
+        pieces: cutter.take::<Piece>(row_layers),
+        sheets: RowSheets { stretch: cutter.take::<Stretch>(grid.columns), stretches: 0, sheet: cutter.take::<Sheet>(row_sheets) },
         plan: Plan {
             // Runs of one block each would have two edges a block.
             edge: cutter.take::<Edge>(blocks.saturating_mul(2)),
@@ -171,16 +178,15 @@ impl Bundle<'_> {
     }
 }
 
-/// `memory` cut up for `bundle`, whose source image `unpack` unpacks if it is packed; `None` where it is too small.
+/// `memory` cut up for `bundle`, whose source image `unpack` unpacks if it is packed; slices of nothing where it is too small.
+#[inline(never)]
 pub fn workspace<'m>(
     bundle: &Bundle<'m>,
     memory: &'m mut [u8],
     unpack: impl Fn(&mut Decoder<'_>, Scratch<'_>, &mut Picture<'_>),
-) -> Option<Workspace<'m>> {
+) -> Workspace<'m> {
     let (_, words, _) = bytemuck::pod_align_to_mut::<u8, u32>(memory);
-    let given = words.len();
     let mut cutter = Cutter::new(words);
     let texture = picture(bundle, &mut cutter, unpack);
-    let workspace = cut(bundle, &mut cutter, texture);
-    (cutter.needed() <= given).then_some(workspace)
+    cut(bundle, &mut cutter, texture)
 }

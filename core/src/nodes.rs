@@ -9,7 +9,7 @@ use crate::coder::{Bits, Probability};
 use crate::field;
 use crate::format::{LabelRecord, MAX_NODE_LAYERS};
 use crate::key::{Key, Setting, Source, Spot};
-use crate::lists::{CHART, Cursor, Lists};
+use crate::lists::{CHART, Cursor, Lists, SheetsRef};
 use crate::predict;
 pub use crate::predict::Trace;
 use heapless::Vec;
@@ -40,7 +40,7 @@ pub fn code_row<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
             *start = layer as u16;
         }
         let mut labels: Vec<Found, MAX_NODE_LAYERS> = Vec::new();
-        around.labels(setting.lists, column < grid.columns, &mut labels);
+        around.labels(column < grid.columns, &mut labels);
         let end = layer.wrapping_add(labels.len());
         // A node that breaks the key's bound carries nothing.
         let fits = end <= target.label.len() && end.wrapping_sub(row_start) <= traces.len() / 2;
@@ -78,49 +78,56 @@ struct Found {
 }
 
 /// The cells around a node as a row of nodes is walked: above and below, in the interval before and after.
-struct Corner {
-    /// The cells to the left of the node, and those to the right.
-    left: [Option<Cursor>; 4],
-    right: [Option<Cursor>; 4],
+struct Corner<'l, 'm> {
+    /// The cells to the left of the node, and those to the right with their lists.
+    left: [SheetsRef<'l>; 4],
+    right: [Option<(&'l Lists<'m>, Cursor)>; 4],
 }
 
-impl Corner {
-    fn new(lists: [Option<&Lists<'_>>; 2], row: usize) -> Self {
-        let mut right = [None; 4];
-        for (slot, (list, above)) in right.iter_mut().zip(lists.iter().flat_map(|&list| [(list, true), (list, false)])) {
-            *slot = list.and_then(|list| if above { row.checked_sub(1).map(|row| list.row(row)) } else { Some(list.row(row)) });
-        }
-        Self { left: [None; 4], right }
+impl<'l, 'm> Corner<'l, 'm> {
+    fn new([before, after]: [Option<&'l Lists<'m>>; 2], row: usize) -> Self {
+        let at = |list: Option<&'l Lists<'m>>, row: Option<usize>| list.zip(row).map(|(list, row)| (list, list.row(row)));
+        let above = row.checked_sub(1);
+        Self { left: [SheetsRef::default(); 4], right: [at(before, above), at(before, Some(row)), at(after, above), at(after, Some(row))] }
     }
 
     /// Collects the labels of the cells around the node, ascending; then moves on.
-    fn labels(&mut self, lists: [Option<&Lists<'_>>; 2], inside: bool, found: &mut Vec<Found, MAX_NODE_LAYERS>) {
-        let [before, after] = lists;
-        let owners = [before, before, after, after];
-        if !inside {
-            self.right = [None; 4];
-        }
-        for (cursors, owner) in self.left.iter().zip(&self.right).zip(owners) {
-            let Some(owner) = owner else { continue };
-            for cursor in [cursors.0, cursors.1].into_iter().flatten() {
-                let sheets = owner.sheets(*cursor);
-                for (index, &label) in sheets.labels.iter().enumerate() {
-                    let tested = sheets.test(index) != CHART;
-                    let at = found.partition_point(|other| other.label < label);
-                    match found.get_mut(at) {
-                        Some(other) if other.label == label => {
-                            other.support = other.support.saturating_add(1);
-                            other.tested |= tested;
-                        }
-                        // Labels past the bound of a node are left out; its cells do without them.
-                        _ => drop(found.insert(at, Found { label, support: 1, tested })),
-                    }
-                }
+    fn labels(&mut self, inside: bool, found: &mut Vec<Found, MAX_NODE_LAYERS>) {
+        for (left, right) in self.left.iter_mut().zip(&mut self.right) {
+            let mut sheets = SheetsRef::default();
+            if let Some((list, cursor)) = right.as_mut().filter(|_| inside) {
+                sheets = list.sheets(*cursor);
+                *cursor = cursor.past(sheets);
             }
+            collect(*left, found);
+            collect(sheets, found);
+            *left = sheets;
         }
-        self.left = self.right;
-        for (cursor, owner) in self.right.iter_mut().zip(owners) {
-            *cursor = cursor.zip(owner).map(|(cursor, owner)| cursor.next(owner));
+    }
+}
+
+/// Adds what a cell's `sheets` say about its nodes.
+fn collect(sheets: SheetsRef<'_>, found: &mut Vec<Found, MAX_NODE_LAYERS>) {
+    for (index, &label) in sheets.labels.iter().enumerate() {
+        let tested = sheets.test(index) != CHART;
+        // A few at most: a walk finds the place as fast as any search.
+        let at = found.iter().take_while(|other| other.label < label).count();
+        let full = found.is_full();
+        match found.get_mut(at) {
+            Some(other) if other.label == label => {
+                other.support = other.support.saturating_add(1);
+                other.tested |= tested;
+            }
+            // Labels past the bound of a node are left out; its cells do without them.
+            _ if full => {}
+            _ => {
+                // Each makes room for the one before it.
+                let mut moved = Found { label, support: 1, tested };
+                for slot in found.iter_mut().skip(at) {
+                    core::mem::swap(slot, &mut moved);
+                }
+                let _ = found.push(moved);
+            }
         }
     }
 }

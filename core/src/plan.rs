@@ -8,10 +8,10 @@ use crate::Bundle;
 use crate::atlas::Texture;
 use crate::coverage::{Chart, Cover};
 use crate::fixed::PlayUv;
-use crate::format::{MAX_SHEETS, SPACE_CUBIC, STRIP};
+use crate::format::{MAX_SHEETS, SPACE_CUBIC};
 use crate::lists::{CHART, FIELD};
 use crate::row::Layer;
-use crate::sheet::{Block, Corners, RowSheets, Rows, Sheet};
+use crate::sheet::{Block, Corners, RowSheets, Rows, Sheet, Stretch};
 
 /// A side of a block in a run, in caller's memory: where it stands at the strip's current row, and how far that is from row to row.
 /// u counts the picture's width as 2^32, v its window's rows as 2^31.
@@ -60,8 +60,10 @@ pub struct Run {
 pub struct Mixed {
     /// The block, from the left.
     pub block: u16,
-    /// Its cell's first sheet.
+    /// Its stretch of cells' first sheet,
     pub sheet: u16,
+    /// and which of those cells it is in.
+    pub along: u16,
     /// Which of the cell's sheets it can show, a bit each; the last of them covers what is left.
     pub sheets: u16,
 }
@@ -159,9 +161,18 @@ pub struct Site<'s, 'a, 'm> {
     pub rows: Rows<'s, 'm>,
     /// Its sheets.
     pub sheets: &'s RowSheets<'m>,
+    /// Every label's chart.
+    pub charts: &'s [Chart],
 }
 
 impl Site<'_, '_, '_> {
+    /// The chart of a sheet's label.
+    #[must_use]
+    #[inline(always)]
+    pub fn chart(&self, sheet: &Sheet) -> Chart {
+        self.charts.get(usize::from(sheet.label())).copied().unwrap_or_default()
+    }
+
     /// A block is 2^this pixels wide and high.
     #[must_use]
     pub fn log2(&self) -> u32 {
@@ -176,15 +187,11 @@ impl Site<'_, '_, '_> {
         Block { rows: self.rows, quarter: Some([block & 1 == 1, strip & 1 == 1]) }
     }
 
-    /// What is above and below strip `strip` where space is cubic.
-    fn lines(&self, strip: u32) -> [Line<'_>; 2] {
-        let [top, halfway, bottom] = self.rows;
-        let first = (strip & 1) as usize;
-        let (upper, lower) = if first == 0 { (top, halfway) } else { (halfway, bottom) };
-        [
-            Line { layer: upper.layer, middle: upper.middle, place: first },
-            Line { layer: lower.layer, middle: lower.middle, place: first.wrapping_add(1) },
-        ]
+    /// What is above and below strip `strip` where space is cubic, from the left corners of `sheet` on: nodes, and halfway to the next.
+    fn lines(&self, strip: u32, sheet: &Sheet) -> [&[Layer]; 2] {
+        let ([top, halfway, bottom], [a, b, c]) = (self.rows, sheet.nodes());
+        let lines = if strip & 1 == 0 { [(top, a), (halfway, b)] } else { [(halfway, b), (bottom, c)] };
+        lines.map(|(row, from)| row.point.get(usize::from(from)..).and_then(|points| bytemuck::try_cast_slice(points).ok()).unwrap_or(&[]))
     }
 
     fn cubic(&self) -> bool {
@@ -199,24 +206,6 @@ impl Site<'_, '_, '_> {
     }
 }
 
-/// A row of nodes as cubic space has it along a strip's upper or lower side: where nodes are, and halfway to the next.
-#[derive(Clone, Copy, Debug)]
-struct Line<'l> {
-    layer: &'l [Layer],
-    middle: &'l [Layer],
-    /// Which of a sheet's three rows this is.
-    place: usize,
-}
-
-impl Line<'_> {
-    /// A sheet's positions in the middle and at the right side of its cell.
-    #[inline(always)]
-    fn points(&self, sheet: &Sheet) -> Option<[PlayUv; 2]> {
-        let [left, right] = sheet.nodes(self.place)?;
-        Some([self.middle.get(usize::from(left))?.uv(), self.layer.get(usize::from(right))?.uv()])
-    }
-}
-
 impl Plan<'_> {
     /// Plans strip `strip` of the screen.
     #[inline(never)]
@@ -227,106 +216,108 @@ impl Plan<'_> {
         let texture = site.bundle.texture();
         let window = Window::new(texture.width_log2, texture.height);
         let (log2, width) = (site.log2(), site.bundle.size().0);
-        let blocks = if site.cubic() { 2u32 } else { 1 };
-        let mut left = 0u32;
-        let mut block = 0u32;
-        let mut column = 0usize;
-        let lines = site.lines(strip);
-        while left < width {
-            let (first, sheets) = site.sheets.cell(column);
-            if let ([_], Some(window)) = (sheets, window)
-                && blocks == 2
-            {
-                // Most of most pictures.
-                let most = (width.saturating_sub(left) >> log2 >> 1) as usize;
-                // In pictures 512 wide, as most are; others go by `append` alone.
-                let cells = if window.width_log2 == 9 { self.extend::<9, 5>(column, most, site.sheets, lines, log2) } else { 0 };
-                if cells > 0 {
-                    let pixels = (cells as u32).wrapping_shl(log2).wrapping_mul(2);
-                    self.smooth = self.smooth.wrapping_add(pixels);
-                    (left, block) = (left.wrapping_add(pixels), block.wrapping_add(cells as u32).wrapping_add(cells as u32));
-                    column = column.wrapping_add(cells);
-                    continue;
-                }
+        let mut across = Across { site, window, strip, log2, width, left: 0, block: 0 };
+        for &stretch in site.sheets.stretches() {
+            match site.sheets.of(stretch) {
+                [sheet] => self.smooth(&mut across, stretch, sheet),
+                sheets => self.cell(&mut across, stretch, sheets),
             }
-            for _ in 0..blocks {
-                let pixels = width.saturating_sub(left).min(1 << log2);
-                let place = site.block(block, strip);
-                let shown = match sheets {
-                    [_] => 1,
-                    _ => candidates(site, &place, sheets),
-                };
-                let single = sheets.get(shown.trailing_zeros() as usize).filter(|_| shown.is_power_of_two());
-                let run = match (single, window) {
-                    (Some(sheet), Some(window)) => self.append(block as u16, sheet, place.corners(sheet), window, texture.height, log2),
-                    _ => false,
-                };
-                if !run {
-                    self.mix(Mixed { block: block as u16, sheet: first as u16, sheets: shown });
-                    self.tests = self.tests.wrapping_add(pixels.wrapping_mul(shown.count_ones().saturating_sub(1)));
-                }
-                let kind = if sheets.len() < 2 { &mut self.smooth } else { &mut self.torn };
-                *kind = kind.wrapping_add(pixels);
-                left = left.wrapping_add(pixels);
-                block = block.wrapping_add(1);
-            }
-            column = column.wrapping_add(1);
         }
     }
 
-    /// Appends smooth cells from `column` on to the last run, both blocks of each, as long as they follow it and fit into its window,
-    /// `most` at most; returns how many. WIDTH and ROWS are the window's.
+    /// Plans a stretch of cells that show one sheet.
+    fn smooth(&mut self, across: &mut Across<'_, '_, '_>, stretch: Stretch, sheet: &Sheet) {
+        let Across { site, window, strip, log2, width, .. } = *across;
+        let lines = site.lines(strip, sheet);
+        let before = across.left;
+        let mut along = 0u16;
+        while along < stretch.cells && across.left < width {
+            // In pictures 512 wide, as most are; others go by `append` alone. Likewise the cell that the screen's edge cuts.
+            if let Some(Window { width_log2: 9, .. }) = window
+                && site.cubic()
+            {
+                let most = (width.saturating_sub(across.left) >> log2 >> 1).min(stretch.cells.wrapping_sub(along).into());
+                let rest = lines.map(|line| line.get(usize::from(along).wrapping_mul(2)..).unwrap_or(&[]));
+                let cells = self.extend(across.block, most as usize, sheet.label(), rest, log2);
+                along = along.wrapping_add(cells);
+                across.block = across.block.wrapping_add(u32::from(cells).wrapping_mul(2));
+                across.left = across.block.wrapping_shl(log2);
+                if along == stretch.cells {
+                    break;
+                }
+            }
+            let here = sheet.further(along);
+            for _ in 0..across.blocks() {
+                let place = across.place();
+                if !self.append(across, &here, place.corners(&here)) {
+                    self.mix(Mixed { block: across.block as u16, sheet: stretch.sheet, along, sheets: 1 });
+                }
+                across.step();
+            }
+            along = along.wrapping_add(1);
+        }
+        self.smooth = self.smooth.wrapping_add(across.left.min(width).saturating_sub(before));
+    }
+
+    /// Plans a cell that shows several sheets, or none.
+    fn cell(&mut self, across: &mut Across<'_, '_, '_>, stretch: Stretch, sheets: &[Sheet]) {
+        let before = across.left;
+        for shown in candidates(across.site, across.strip, sheets).into_iter().take(across.blocks() as usize) {
+            let place = across.place();
+            let single = sheets.get(shown.trailing_zeros() as usize).filter(|_| shown.is_power_of_two());
+            if !single.is_some_and(|sheet| self.append(across, sheet, place.corners(sheet))) {
+                self.mix(Mixed { block: across.block as u16, sheet: stretch.sheet, along: 0, sheets: shown });
+                let pixels = across.width.saturating_sub(across.left).min(1 << across.log2);
+                self.tests = self.tests.wrapping_add(pixels.wrapping_mul(shown.count_ones().saturating_sub(1)));
+            }
+            across.step();
+        }
+        let pixels = across.left.min(across.width).saturating_sub(before);
+        let kind = if sheets.is_empty() { &mut self.smooth } else { &mut self.torn };
+        *kind = kind.wrapping_add(pixels);
+    }
+
+    /// Appends smooth cells, the first of which begins with block `block`, to the last run, both blocks of each, as long as they follow it and fit
+    /// into its window, `most` at most; returns how many. `above` and `below` start at their left corners.
     #[inline(never)]
-    fn extend<const WIDTH: u32, const ROWS: u32>(
-        &mut self,
-        column: usize,
-        most: usize,
-        sheets: &RowSheets<'_>,
-        [above, below]: [Line<'_>; 2],
-        log2: u32,
-    ) -> usize {
+    fn extend(&mut self, block: u32, most: usize, label: u8, [above, below]: [&[Layer]; 2], log2: u32) -> u16 {
         let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return 0 };
-        let block = column.wrapping_mul(2);
-        if usize::from(run.block).wrapping_add(usize::from(run.blocks)) != block {
+        if run.label != u16::from(label) || u32::from(run.block).wrapping_add(u32::from(run.blocks)) != block {
             return 0;
         }
-        let Some((&first, starts)) = sheets.start.get(column..).and_then(<[u16]>::split_first) else { return 0 };
-        let Some(listed) = sheets.sheet.get(usize::from(first)..) else { return 0 };
+        let (Some((_, above)), Some((_, below))) = (above.split_first(), below.split_first()) else { return 0 };
         let Some(edges) = self.edge.get_mut(self.edges..) else { return 0 };
-        let label = run.label as u8;
-        let window = Window { width_log2: WIDTH, rows_log2: ROWS };
+        let window = Window { width_log2: 9, rows_log2: 5 };
         let row = u32::from(run.row);
         let least = (row as i32).wrapping_shl(16).wrapping_add(MARGIN);
-        let [across, down] = [WIDTH, ROWS].map(|log2| 1u32.wrapping_shl(log2.wrapping_add(16)));
-        let inside = |uv: PlayUv| (uv.u.wrapping_sub(MARGIN) as u32) < across.wrapping_sub((2 * MARGIN) as u32);
-        let within = |uv: PlayUv| (uv.v.wrapping_sub(least) as u32) < down.wrapping_sub((2 * MARGIN) as u32);
+        let [across, down] = [window.width_log2, window.rows_log2].map(|log2| 1u32.wrapping_shl(log2.wrapping_add(16)));
+        let [wide, high] = [across, down].map(|size| size.wrapping_sub((2 * MARGIN) as u32));
         let [mut from, mut to] = self.last;
-        let mut next = first;
         let mut done = 0usize;
-        for ((sheet, &start), [middle, right]) in listed.iter().zip(starts).zip(edges.as_chunks_mut::<2>().0).take(most) {
-            next = next.wrapping_add(1);
-            if start != next || sheet.label() != label {
-                break;
-            }
-            let (Some([a, b]), Some([c, d])) = (above.points(sheet), below.points(sheet)) else { break };
-            if !(inside(a) && inside(b) && inside(c) && inside(d) && within(a) && within(b) && within(c) && within(d)) {
-                break;
-            }
+        for ((edge, a), b) in edges.iter_mut().zip(above).zip(below).take(most.wrapping_mul(2)) {
+            let (a, b) = (a.uv(), b.uv());
             // As in `append`: steps across of less than half the width, which is a power of two.
-            let step = |from: i32, to: i32| to.wrapping_sub(from).wrapping_add((across >> 1) as i32) as u32;
-            if step(from, a.u) | step(a.u, b.u) | step(to, c.u) | step(c.u, d.u) >= across {
+            let [near, far] = [a.u.wrapping_sub(from), b.u.wrapping_sub(to)].map(|step| step.wrapping_add((across >> 1) as i32) as u32);
+            let inside = (a.u.wrapping_sub(MARGIN) as u32) < wide && (b.u.wrapping_sub(MARGIN) as u32) < wide && (near | far) < across;
+            if !(inside && (a.v.wrapping_sub(least) as u32) < high && (b.v.wrapping_sub(least) as u32) < high) {
                 break;
             }
-            *middle = window.edge(a, c, row, log2);
-            *right = window.edge(b, d, row, log2);
-            (from, to) = (b.u, d.u);
+            *edge = window.edge(a, b, row, log2);
+            (from, to) = (a.u, b.u);
             done = done.wrapping_add(1);
         }
-        let blocks = done.wrapping_mul(2);
-        run.blocks = run.blocks.wrapping_add(blocks as u16);
-        self.edges = self.edges.wrapping_add(blocks);
+        if done & 1 == 1 {
+            // Half a cell is for `append`, which finds the same.
+            done = done.wrapping_sub(1);
+            let before =
+                |line: &[Layer], known: i32| done.checked_sub(1).and_then(|last| line.get(last)).map_or(known, |layer| layer.uv().u);
+            let [a, b] = self.last;
+            (from, to) = (before(above, a), before(below, b));
+        }
+        run.blocks = run.blocks.wrapping_add(done as u16);
+        self.edges = self.edges.wrapping_add(done);
         self.last = [from, to];
-        done
+        (done >> 1) as u16
     }
 
     fn mix(&mut self, mixed: Mixed) {
@@ -336,9 +327,11 @@ impl Plan<'_> {
         }
     }
 
-    /// Appends a block that shows one sheet to the last run, or begins another; false where its positions fit no window.
+    /// Appends the block at `across`, which shows one sheet, to the last run, or begins another; false where its positions fit no window.
     #[inline(never)]
-    fn append(&mut self, block: u16, sheet: &Sheet, corners: Corners, window: Window, height: u32, log2: u32) -> bool {
+    fn append(&mut self, across: &Across<'_, '_, '_>, sheet: &Sheet, corners: Corners) -> bool {
+        let Some(window) = across.window else { return false };
+        let (block, log2, height) = (across.block as u16, across.log2, across.site.texture.height);
         let [a, b, c, d] = corners;
         let width = 1i32.wrapping_shl(window.width_log2.wrapping_add(16));
         let inside = |x: i32, limit: i32| (x.wrapping_sub(MARGIN) as u32) < limit.wrapping_sub(2 * MARGIN) as u32;
@@ -399,59 +392,106 @@ impl Plan<'_> {
     }
 }
 
-/// Which of a torn cell's `sheets` the block can show, a bit each: those that cover part of it, in front of the first that
-/// covers all of it.
+/// How far a strip is planned.
+#[derive(Clone, Copy, Debug)]
+struct Across<'s, 'a, 'm> {
+    site: &'s Site<'s, 'a, 'm>,
+    window: Option<Window>,
+    strip: u32,
+    log2: u32,
+    /// The screen's width, and pixels to the left of the next block.
+    width: u32,
+    left: u32,
+    /// The next block.
+    block: u32,
+}
+
+impl Across<'_, '_, '_> {
+    /// Blocks of a cell, from left to right.
+    fn blocks(&self) -> u32 {
+        if self.site.cubic() { 2 } else { 1 }
+    }
+
+    fn place(&self) -> Block<'_, '_> {
+        self.site.block(self.block, self.strip)
+    }
+
+    /// On to the next block.
+    fn step(&mut self) {
+        self.block = self.block.wrapping_add(1);
+        self.left = self.block.wrapping_shl(self.log2);
+    }
+}
+
+/// Which of a torn cell's `sheets` each of its blocks in strip `strip` can show, a bit each: those that cover part of it, in front of the
+/// first that covers all of it. Where a cell is one block, the second is none.
 #[inline(never)]
-fn candidates(site: &Site<'_, '_, '_>, block: &Block<'_, '_>, sheets: &[Sheet]) -> u16 {
-    let mut shown = 0u16;
+fn candidates(site: &Site<'_, '_, '_>, strip: u32, sheets: &[Sheet]) -> [u16; 2] {
+    let (cubic, lower) = (site.cubic(), strip & 1 == 1);
+    let blocks = [0, 1].map(|right| site.block(right, strip));
+    let mut shown = [0u16; 2];
+    let mut open = [true, cubic];
     let last = sheets.len().wrapping_sub(1);
     for (place, sheet) in sheets.iter().enumerate().take(MAX_SHEETS) {
         let bit = 1u16.wrapping_shl(place as u32);
-        if place == last {
-            return shown | bit;
-        }
-        let record = site.bundle.label(sheet.label());
-        let mut cover = Cover::All;
-        if sheet.test() != CHART {
-            cover = field_cover(block.field(sheet, 0), block.quarter);
-            if record.flags & STRIP != 0 {
-                cover = cover.and(field_cover(block.field(sheet, 1), block.quarter));
+        let mut covers = [Cover::All; 2];
+        if place != last {
+            let chart = site.chart(sheet);
+            if sheet.test() != CHART {
+                let [first, ..] = &blocks;
+                covers = field_covers(first.field(sheet, 0), cubic, lower);
+                if chart.strip() {
+                    let [left, right] = field_covers(first.field(sheet, 1), cubic, lower);
+                    covers = [covers[0].and(left), covers[1].and(right)];
+                }
+            }
+            if sheet.test() != FIELD {
+                for ((cover, block), open) in covers.iter_mut().zip(&blocks).zip(open) {
+                    if open && *cover != Cover::Nothing {
+                        *cover = cover.and(chart.cover(&block.corners(sheet)));
+                    }
+                }
             }
         }
-        if sheet.test() != FIELD && cover != Cover::Nothing {
-            cover = cover.and(Chart::new(&record).cover(&block.corners(sheet)));
+        for ((shown, cover), open) in shown.iter_mut().zip(covers).zip(&mut open) {
+            if *open && cover != Cover::Nothing {
+                *shown |= bit;
+                *open = cover != Cover::All;
+            }
         }
-        match cover {
-            Cover::Nothing => {}
-            Cover::Part => shown |= bit,
-            Cover::All => return shown | bit,
+        if open == [false; 2] {
+            break;
         }
     }
     shown
 }
 
-/// How much of a block a field of `corners` at the cell's corners covers.
-fn field_cover(corners: [i32; 4], quarter: Option<[bool; 2]>) -> Cover {
-    let [mut a, mut b, mut c, mut d] = corners;
-    if let Some([right, lower]) = quarter {
-        let middle = |x: i32, y: i32| x.wrapping_add(y) >> 1;
-        if lower {
-            (a, b) = (middle(a, c), middle(b, d));
-        } else {
-            (c, d) = (middle(a, c), middle(b, d));
-        }
-        if right {
-            (a, c) = (middle(a, b), middle(c, d));
-        } else {
-            (b, d) = (middle(a, b), middle(c, d));
-        }
+/// How much of a cell's blocks in one of its strips a field of `corners` at the cell's corners covers: of the left one and the right one where
+/// they are `quarters`, of the cell where not.
+#[inline(always)]
+fn field_covers([mut a, mut b, mut c, mut d]: [i32; 4], quarters: bool, lower: bool) -> [Cover; 2] {
+    if !quarters {
+        return [field_cover([a, b, c, d]); 2];
     }
+    let middle = |x: i32, y: i32| x.wrapping_add(y) >> 1;
+    let (left, right) = (middle(a, c), middle(b, d));
+    if lower {
+        (a, b) = (left, right);
+    } else {
+        (c, d) = (left, right);
+    }
+    let (above, below) = (middle(a, b), middle(c, d));
+    [field_cover([a, above, c, below]), field_cover([above, b, below, d])]
+}
+
+/// How much of a block a field of these values at its corners covers.
+#[inline(always)]
+fn field_cover([a, b, c, d]: [i32; 4]) -> Cover {
     // Rounding moves a field by less than this, Q16 pixels.
     const SLACK: i32 = 64;
-    let (low, high) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
-    if low > SLACK {
+    if a > SLACK && b > SLACK && c > SLACK && d > SLACK {
         Cover::All
-    } else if high < -SLACK {
+    } else if a < -SLACK && b < -SLACK && c < -SLACK && d < -SLACK {
         Cover::Nothing
     } else {
         Cover::Part

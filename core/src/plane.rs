@@ -122,6 +122,37 @@ fn excess<'v>(values: impl Iterator<Item = &'v i64>, bits: u32) -> u32 {
     used.saturating_sub(bits)
 }
 
+/// Positions are below this, stored units.
+const LIMIT: u32 = 1 << 17;
+
+/// Division by one number of several whose quotients are small: long divisions are slow on small processors.
+struct Quotient {
+    divisor: u64,
+    /// How far everything is shifted down for a guess, and the least number that the divisor is below then, or it itself where that is nothing.
+    shift: u32,
+    short: u32,
+}
+
+impl Quotient {
+    /// Division by `divisor`, at least 1.
+    const fn new(divisor: u64) -> Self {
+        let shift = 49u32.saturating_sub(divisor.leading_zeros());
+        let short = (divisor >> shift) as u32;
+        Self { divisor, shift, short: if shift == 0 { short } else { short.wrapping_add(1) } }
+    }
+
+    /// `numerator` (below 2^63) divided, rounded down; `None` if that is far above [`LIMIT`].
+    fn of(&self, numerator: u64) -> Option<u32> {
+        // Exact, or below 2^32 / 2^14 and too small by at most a 2^14-th of it and one.
+        let mut quotient = u32::try_from(numerator >> self.shift).ok()?.checked_div(self.short)?;
+        let mut rest = numerator.wrapping_sub(u64::from(quotient).wrapping_mul(self.divisor));
+        while rest >= self.divisor && quotient <= LIMIT {
+            (rest, quotient) = (rest.wrapping_sub(self.divisor), quotient.wrapping_add(1));
+        }
+        Some(quotient)
+    }
+}
+
 impl View {
     /// `plane` seen by `camera`, for coordinates of `key_bits` fraction bits. Whatever the bytes say, there is some answer.
     #[must_use]
@@ -163,16 +194,42 @@ impl View {
         if divisor <= 0 {
             return None;
         }
+        // Terms are below 2^30 and there are at most 1025 nodes in a row: all are below 2^42.
+        let (up, down) = match self.scale {
+            up @ 0..=20 => (up as u32, 0),
+            down @ -20..0 => (0, down.unsigned_abs()),
+            _ => return None,
+        };
+        let divisor = divisor.wrapping_shl(down);
+        let quotient = Quotient::new(divisor as u64);
         let axis = |numerator: i64| {
-            // Terms are below 2^30 and there are at most 1025 nodes in a row: both are below 2^42.
-            let (numerator, divisor) = match self.scale {
-                up @ 0..=20 => (numerator.wrapping_shl(up as u32), divisor),
-                down @ -20..0 => (numerator, divisor.wrapping_shl(down.unsigned_abs())),
-                _ => return None,
-            };
-            let position = numerator.wrapping_add(divisor >> 1).checked_div_euclid(divisor)?;
-            i32::try_from(position).ok().filter(|position| position.unsigned_abs() < 1 << 17)
+            let numerator = numerator.wrapping_shl(up).wrapping_add(divisor >> 1);
+            // Rounded towards minus infinity.
+            let flip = numerator >> 63;
+            let position = quotient.of((numerator ^ flip) as u64)? as i32 ^ flip as i32;
+            Some(position).filter(|position| position.unsigned_abs() < LIMIT)
         };
         Some([axis(u)?, axis(v)?])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{LIMIT, Quotient};
+
+    #[test]
+    fn quotients_are_those_of_a_long_division() {
+        let mut seed = 7u64;
+        let mut next = |bits: u32| {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            seed >> (64 - bits)
+        };
+        for round in 0..20_000u32 {
+            let divisor = next(1 + round % 45).max(1);
+            let exact = next(18);
+            let numerator = exact * divisor + next(46) % divisor;
+            let quotient = Quotient::new(divisor).of(numerator).filter(|&quotient| quotient < LIMIT);
+            assert_eq!(quotient.map(u64::from), Some(exact).filter(|&exact| exact < u64::from(LIMIT)), "{numerator} / {divisor}");
+        }
     }
 }

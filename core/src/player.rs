@@ -35,7 +35,17 @@ impl<'a, T: Texels> Player<'a, T> {
     /// Those of [`Player::new`]; [`MemoryError::Texels`] says what the bundle needs.
     #[inline]
     pub fn with_texels(bundle: &'a Bundle<'a>, memory: &'a mut [u8]) -> Result<Self, MemoryError> {
-        Ok(Self { playing: T::start(bundle, memory)?, texels: PhantomData })
+        let (needed, given, kind) = (bundle.memory_needed(), memory.len(), bundle.texel_kind());
+        if !T::known(kind) {
+            return Err(MemoryError::Texels { needed: kind });
+        }
+        if given < needed {
+            return Err(MemoryError::TooSmall { needed, given });
+        }
+        let mut player = Self { playing: T::open(bundle, memory), texels: PhantomData };
+        // After what it took to open the bundle is off the stack.
+        player.playing.start();
+        Ok(player)
     }
 
     /// The bundle that plays.

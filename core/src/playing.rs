@@ -1,8 +1,10 @@
 //! Playing, whatever the texels are: keys are decoded into the caller's memory by `seek`, rows of cells made ready to be drawn.
 //! `player` is what callers see of it, `texels` what pixels are made by.
 
+use crate::Bundle;
 use crate::atlas::Texture;
 use crate::coder::Decoder;
+use crate::coverage::Chart;
 use crate::draw::{Drawing, Probes};
 use crate::format::{self, SPACE_CUBIC, TexelKind};
 use crate::key::Nothing;
@@ -12,7 +14,6 @@ use crate::record::{Place, SLICE_COST, Shape};
 use crate::row::Around;
 use crate::timeline::Moment;
 use crate::work::{Probe, Work};
-use crate::{Bundle, MemoryError};
 
 /// A frame number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Default)]
@@ -110,27 +111,32 @@ pub struct Look<'t> {
 }
 
 impl<'a> Playing<'a> {
-    /// Starts at frame 0; `unpack` unpacks a packed source image.
-    ///
-    /// # Errors
-    /// [`MemoryError::TooSmall`] where `memory` has fewer bytes than [`Bundle::memory_needed`].
-    pub fn new(
-        bundle: &'a Bundle<'a>,
-        memory: &'a mut [u8],
-        unpack: impl Fn(&mut Decoder<'_>, Scratch<'_>, &mut Picture<'_>),
-    ) -> Result<Self, MemoryError> {
-        let (needed, given) = (bundle.memory_needed(), memory.len());
-        let too_small = MemoryError::TooSmall { needed, given };
-        if given < needed {
-            return Err(too_small);
+    /// At no frame yet, before the first `seek`, over at least [`Bundle::memory_needed`] bytes of `memory`; `unpack` unpacks a packed source
+    /// image.
+    // What this returns is large: no copy of it may be left on the callers' stack.
+    #[inline(never)]
+    pub fn new(bundle: &'a Bundle<'a>, memory: &'a mut [u8], unpack: impl Fn(&mut Decoder<'_>, Scratch<'_>, &mut Picture<'_>)) -> Self {
+        Self {
+            bundle,
+            space: memory::workspace(bundle, memory, unpack),
+            frame: Frame(0),
+            moment: bundle.moment(0),
+            last: None,
+            coming: None,
+            loaded: None,
+            work: Work::default(),
+            swapped: false,
         }
-        let space = memory::workspace(bundle, memory, unpack).ok_or(too_small)?;
-        let moment = bundle.moment(0);
-        let mut playing =
-            Self { bundle, space, frame: Frame(0), moment, last: None, coming: None, loaded: None, work: Work::default(), swapped: false };
-        playing.set_byte_order(ByteOrder::Native);
-        playing.seek(Frame(0));
-        Ok(playing)
+    }
+
+    /// Makes ready what does not change from frame to frame, and frame 0 the current one.
+    #[inline(never)]
+    pub fn start(&mut self) {
+        for (label, chart) in (0..=u8::MAX).zip(self.space.charts.iter_mut()) {
+            *chart = Chart::new(&self.bundle.label(label));
+        }
+        self.set_byte_order(ByteOrder::Native);
+        self.seek(Frame(0));
     }
 
     /// The bundle that plays.
@@ -255,25 +261,26 @@ impl<'a> Playing<'a> {
         let row = (y >> self.bundle.grid().log2) as usize;
         let inside = y < self.bundle.size().1;
         if inside && self.loaded != Some(row) {
-            self.load(row);
             self.space.plan.strip = None;
+            return self.load(row);
         }
         inside
     }
 
-    /// Interpolates the nodes around a row of cells and looks up its sheets.
-    fn load(&mut self, row: usize) {
+    /// Interpolates the nodes around a row of cells and looks up its sheets; false where the keys for it are not held, which does not happen.
+    #[inline(never)]
+    fn load(&mut self, row: usize) -> bool {
         let grid = self.bundle.grid();
         // How long ago the key at the start of the interval was decoded, and through it the others.
         let age = self.needed().ahead;
         let bundle = self.bundle;
         let from = self.moment.interval as isize;
-        let Workspace { stream, rows, halfway, sheets, .. } = &mut self.space;
+        let Workspace { stream, rows, halfway, pieces, sheets, .. } = &mut self.space;
         let at = |offset: isize| {
             let inside = bundle.looping() || (0..bundle.key_count() as isize).contains(&from.wrapping_add(offset));
             stream.key(age.checked_add_signed(offset.wrapping_neg())?).filter(|_| inside)
         };
-        let Some((start, lists)) = stream.key(age).zip(stream.lists(age)) else { return };
+        let Some((start, lists)) = stream.key(age).zip(stream.lists(age)) else { return false };
         let cubic_time = format::reach(bundle.path().time).0 == 1;
         let around = Around {
             before: at(-1).filter(|_| cubic_time),
@@ -299,17 +306,18 @@ impl<'a> Playing<'a> {
         for (place, nodes) in rows.iter_mut().enumerate().skip(known) {
             // The second row of the four is the row of cells' upper edge; the outer two are for the middles alone.
             if cubic || place == 1 || place == 2 {
-                let layers = nodes.fill(grid, row.wrapping_add(place).checked_sub(1), &around, &self.moment);
+                let layers = nodes.fill(pieces, grid, row.wrapping_add(place).checked_sub(1), &around, &self.moment);
                 self.work.layers = self.work.layers.wrapping_add(layers);
             }
         }
         let [before, top, bottom, after] = &*rows;
         if cubic {
-            let layers = halfway.between(grid.node_columns(), [before, top, bottom, after]);
+            let layers = halfway.between([before, top, bottom, after]);
             self.work.middles = self.work.middles.wrapping_add(layers);
         }
         sheets.fill(grid, row, lists, [top, halfway, bottom], cubic);
         self.loaded = Some(row);
+        true
     }
 
     /// Takes up `key`, which follows the last one or is independent, where it was left, or begins it.

@@ -102,49 +102,46 @@ fn trace_index(key: &Key<'_>, grid: Grid, length: usize, row: usize, layer: usiz
 
 /// A layer of the same label at a neighbouring node.
 #[derive(Clone, Copy)]
-struct Neighbour {
+struct Neighbour<'t> {
     uv: [i32; 2],
-    trace: Trace,
+    trace: &'t Trace,
 }
 
 /// The neighbours that are already coded: west, north, north-east, north-west, and one further west and north.
-struct Neighbours {
-    west: Option<Neighbour>,
-    north: Option<Neighbour>,
-    north_east: Option<Neighbour>,
-    north_west: Option<Neighbour>,
+struct Neighbours<'t> {
+    near: [Option<Neighbour<'t>>; 4],
     far_west: Option<[i32; 2]>,
     far_north: Option<[i32; 2]>,
 }
 
-impl Neighbours {
-    fn new(grid: Grid, key: &Key<'_>, traces: &[Trace], spot: &Spot) -> Self {
+impl<'t> Neighbours<'t> {
+    fn new(grid: Grid, key: &Key<'_>, traces: &'t [Trace], spot: &Spot) -> Self {
         let width = grid.node_columns();
-        let at = |left: usize, up: usize| {
-            let inside = spot.column >= left && spot.row >= up;
-            inside.then(|| spot.node.wrapping_sub(left).wrapping_sub(up.wrapping_mul(width)))
-        };
-        let near = |node: Option<usize>, row: usize| {
-            let layer = key.find(node?, spot.label)?;
+        let near = |node: usize, row: usize| {
+            let layer = key.find(node, spot.label)?;
             let uv = key.uv(layer);
-            let trace = traces.get(trace_index(key, grid, traces.len(), row, layer)?).copied()?;
+            let trace = traces.get(trace_index(key, grid, traces.len(), row, layer)?)?;
             Some(Neighbour { uv: [uv.u(), uv.v()], trace })
         };
-        let far = |node: Option<usize>| key.position(node?, spot.label);
-        let above = spot.row.wrapping_sub(1);
-        let east = (spot.row > 0 && spot.column.wrapping_add(1) < width).then(|| spot.node.wrapping_sub(width).wrapping_add(1));
+        let far = |node: usize| key.position(node, spot.label);
+        let (node, left, up) = (spot.node, spot.column > 0, spot.row > 0);
+        let (north, above) = (node.wrapping_sub(width), spot.row.wrapping_sub(1));
+        let west = if left { near(node.wrapping_sub(1), spot.row) } else { None };
+        let [north_east, north_west] = [
+            if up && spot.column.wrapping_add(1) < width { near(north.wrapping_add(1), above) } else { None },
+            if up && left { near(north.wrapping_sub(1), above) } else { None },
+        ];
+        let direct = if up { near(north, above) } else { None };
+        // Those further on count with the ones before them alone.
         Self {
-            west: near(at(1, 0), spot.row),
-            north: near(at(0, 1), above),
-            north_east: near(east, above),
-            north_west: near(at(1, 1), above),
-            far_west: far(at(2, 0)),
-            far_north: far(at(0, 2)),
+            far_west: if west.is_some() && spot.column > 1 { far(node.wrapping_sub(2)) } else { None },
+            far_north: if direct.is_some() && spot.row > 1 { far(north.wrapping_sub(width)) } else { None },
+            near: [west, direct, north_east, north_west],
         }
     }
 
-    fn all(&self) -> impl Iterator<Item = &Neighbour> {
-        [&self.west, &self.north, &self.north_east, &self.north_west].into_iter().flatten()
+    fn all(&self) -> impl Iterator<Item = &Neighbour<'t>> {
+        self.near.iter().flatten()
     }
 }
 
@@ -165,14 +162,32 @@ fn minus(a: [i32; 2], b: [i32; 2]) -> [i32; 2] {
     [a.wrapping_sub(c), b.wrapping_sub(d)]
 }
 
-/// The mean of up to four values, rounded towards minus infinity.
-fn mean(values: impl Iterator<Item = [i32; 2]>) -> Option<[i32; 2]> {
-    let (sum, count) = values.fold(([0, 0], 0i32), |(sum, count), value| (plus(sum, value), count.wrapping_add(1)));
-    (count > 0).then(|| sum.map(|x| x.checked_div_euclid(count).unwrap_or(0)))
+/// A sum of up to four values.
+#[derive(Clone, Copy, Default)]
+struct Sum {
+    sum: [i32; 2],
+    count: u32,
+}
+
+impl Sum {
+    fn add(&mut self, value: [i32; 2]) {
+        (self.sum, self.count) = (plus(self.sum, value), self.count.wrapping_add(1));
+    }
+
+    /// The mean, rounded towards minus infinity. Divisions are by known numbers: not every processor has another.
+    fn mean(self) -> Option<[i32; 2]> {
+        match self.count {
+            0 => None,
+            1 => Some(self.sum),
+            2 => Some(self.sum.map(|x| x >> 1)),
+            3 => Some(self.sum.map(|x| x.div_euclid(3))),
+            _ => Some(self.sum.map(|x| x >> 2)),
+        }
+    }
 }
 
 impl Candidates {
-    fn new<L>(setting: &Setting<'_, '_, L>, around: &Neighbours, spot: &Spot) -> Self {
+    fn new<L>(setting: &Setting<'_, '_, L>, around: &Neighbours<'_>, spot: &Spot) -> Self {
         let held = setting.before.and_then(|k| k.position(spot.node, spot.label));
         let older = setting.before_that.and_then(|(k, ratio)| Some((k.position(spot.node, spot.label)?, ratio)));
         let temporal = held.map(|held| match older {
@@ -180,46 +195,66 @@ impl Candidates {
             Some((older, ratio)) => plus(held, minus(held, older).map(|d| d.wrapping_mul(ratio) >> 8)),
             None => held,
         });
-        let correction = |n: &Neighbour| (n.trace.known & TEMPORAL != 0).then(|| n.trace.correction.map(i32::from));
-        let corrected = temporal.zip(mean(around.all().filter_map(correction)));
+        let [west, north, _, north_west] = &around.near;
+        let (mut corrections, mut offsets, mut positions) = (Sum::default(), Sum::default(), Sum::default());
+        for n in around.all() {
+            positions.add(n.uv);
+            if n.trace.known & TEMPORAL != 0 {
+                corrections.add(n.trace.correction.map(i32::from));
+            }
+            if n.trace.known & FLAT != 0 {
+                offsets.add(n.trace.offset.map(i32::from));
+            }
+        }
+        let correction = |n: &Neighbour<'_>| (n.trace.known & TEMPORAL != 0).then(|| n.trace.correction.map(i32::from));
+        let corrected = temporal.zip(corrections.mean());
         let plane = |w: [i32; 2], n: [i32; 2], nw: [i32; 2]| minus(plus(w, n), nw);
-        let corner = around.west.as_ref().zip(around.north.as_ref()).zip(around.north_west.as_ref());
+        let corner = west.as_ref().zip(north.as_ref()).zip(north_west.as_ref());
         let corner_correction = corner.and_then(|((w, n), nw)| Some(plane(correction(w)?, correction(n)?, correction(nw)?)));
-        let line = |near: Option<Neighbour>, far: Option<[i32; 2]>| near.zip(far).map(|(near, far)| minus(plus(near.uv, near.uv), far));
-        let lines = [line(around.west, around.far_west), line(around.north, around.far_north)];
+        let mut lines = Sum::default();
+        for (near, far) in [(west, around.far_west), (north, around.far_north)] {
+            if let (Some(near), Some(far)) = (near, far) {
+                lines.add(minus(plus(near.uv, near.uv), far));
+            }
+        }
         let view = setting.planes.binary_search_by_key(&spot.label, |[label, ..]| *label).ok().and_then(|plane| setting.views.get(plane));
         let flat = view.and_then(|view| view.at(spot.column, spot.row));
-        let offset = |n: &Neighbour| (n.trace.known & FLAT != 0).then(|| n.trace.offset.map(i32::from));
         // Of equally good predictions the first is taken: what a plane tells is best where nothing else is known.
         let uv = [
             flat,
-            flat.zip(mean(around.all().filter_map(offset))).map(|(f, o)| plus(f, o)),
+            flat.zip(offsets.mean()).map(|(f, o)| plus(f, o)),
             temporal,
             corrected.map(|(t, c)| plus(t, c)),
             corrected.map(|(t, c)| plus(t, c.map(|x| x >> 1))),
             temporal.zip(corner_correction).map(|(t, c)| plus(t, c)),
             corner.map(|((w, n), nw)| plane(w.uv, n.uv, nw.uv)),
-            mean(lines.into_iter().flatten()),
-            mean(around.all().map(|n| n.uv)),
+            lines.mean(),
+            positions.mean(),
             older.and(held),
         ];
         Self { uv, temporal, flat }
     }
 
     /// The candidate that was best at the neighbours, and the class of how noisy they were.
-    fn choose(&self, around: &Neighbours, record: &LabelRecord, key_bits: u32) -> ([i32; 2], usize) {
+    fn choose(&self, around: &Neighbours<'_>, record: &LabelRecord, key_bits: u32) -> ([i32; 2], usize) {
+        let (mut errors, mut noise, mut count) = ([0u32; PREDICTORS], 0u32, 0u32);
+        for n in around.all() {
+            for (sum, &error) in errors.iter_mut().zip(&n.trace.error) {
+                *sum = sum.wrapping_add(error.into());
+            }
+            (noise, count) = (noise.wrapping_add(n.trace.noise.into()), count.wrapping_add(1));
+        }
         let mut best: Option<(u32, [i32; 2])> = None;
-        for (index, candidate) in self.uv.iter().enumerate() {
+        for (candidate, error) in self.uv.iter().zip(errors) {
             let Some(candidate) = candidate else { continue };
-            let error = around.all().map(|n| u32::from(n.trace.error.get(index).copied().unwrap_or(255))).fold(0u32, u32::wrapping_add);
             if best.is_none_or(|(least, _)| error < least) {
                 best = Some((error, *candidate));
             }
         }
-        let (noise, count) = around.all().fold((0u32, 0u32), |(sum, n), x| (sum.wrapping_add(u32::from(x.trace.noise)), n.wrapping_add(1)));
-        let class = match (noise.wrapping_mul(2)).checked_div(count) {
-            None => NOISE_CLASSES - 1,
-            Some(twice) => [1, 2, 4, 8, 14, 26, 60].iter().take_while(|&&limit| twice >= limit).count(),
+        // Twice the mean noise is at least a limit where twice the noise is at least as many times the limit.
+        let class = match count {
+            0 => NOISE_CLASSES - 1,
+            _ => [1, 2, 4, 8, 14, 26, 60].iter().take_while(|&&limit| noise.wrapping_mul(2) >= count.wrapping_mul(limit)).count(),
         };
         let centre = || {
             let middle = |a: u16, b: u16| i32::from(a).wrapping_add(i32::from(b)).wrapping_shl(key_bits) >> 1;

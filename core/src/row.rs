@@ -1,7 +1,7 @@
 //! A row of nodes at one moment: its layers interpolated in time, or halfway between two such rows.
 //! Keys come from the caller's memory, rows go to `sheet`.
 
-use crate::fixed::{KEY_MIN, KeyUv, ONE, PLAY_BITS, PlayUv, WEIGHT_BITS, middle};
+use crate::fixed::{KEY_MIN, KeyUv, ONE, PLAY_BITS, PlayUv, WEIGHT_BITS, field_distance, middle};
 use crate::grid::Grid;
 use crate::key::Key;
 use crate::timeline::{Moment, Weights};
@@ -35,88 +35,86 @@ impl Layer {
     }
 }
 
-/// Looks up labels in one row of nodes, node by node from left to right.
-#[derive(Clone, Debug)]
-pub struct Walk<'w> {
-    ends: core::slice::Iter<'w, u16>,
+/// No layer, no chain.
+const NONE: u16 = u16::MAX;
+
+/// A layer of a row of nodes, in caller's memory.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Point {
+    /// The layer.
+    pub at: Layer,
+    /// Where space is cubic, what is halfway to the next one of its chain.
+    pub middle: Layer,
+}
+
+/// Steps through the nodes of a key's row, from left to right.
+#[derive(Clone, Copy, Debug)]
+struct Walk<'w> {
+    /// Where the layers of the nodes to come end.
+    ends: &'w [u16],
     labels: &'w [u8],
-    /// Positions, where the nodes are a key's.
-    uv: &'w [u32],
-    from: usize,
-    to: usize,
-    /// Where `seek` goes on.
-    next: usize,
+    /// The first layer of the node that `seek` has not passed, and where the node's end.
+    next: u16,
+    to: u16,
 }
 
 impl<'w> Walk<'w> {
-    /// A walk over nodes whose layers start at `starts`, with one entry more than there are nodes; before the first of them.
-    fn new(starts: &'w [u16], labels: &'w [u8], uv: &'w [u32]) -> Self {
-        let mut ends = starts.iter();
-        let to = ends.next().map_or(0, |&at| usize::from(at));
-        Self { ends, labels, uv, from: to, to, next: to }
+    /// Over the `columns` nodes of `key` from node `first` on, before the first of them; over none without a key.
+    fn new(key: Option<&'w Key<'_>>, first: usize, columns: usize) -> Self {
+        let starts = key.and_then(|key| key.start.get(first..=first.wrapping_add(columns))?.split_first());
+        let (to, ends) = starts.map_or((0, &[][..]), |(&at, ends)| (at, ends));
+        Self { ends, labels: key.map_or(&[], |key| &*key.label), next: to, to }
     }
 
     /// On to the next node; past the last there is one without layers.
-    #[inline]
-    pub fn step(&mut self) {
-        self.from = self.to;
-        if let Some(&end) = self.ends.next() {
-            self.to = usize::from(end);
+    #[inline(always)]
+    fn step(&mut self) {
+        self.next = self.to;
+        if let Some((&end, ends)) = self.ends.split_first() {
+            (self.to, self.ends) = (end, ends);
         }
-        self.next = self.from;
     }
 
-    /// Like `find`, for labels that are asked for in ascending order, as nodes have them.
+    /// The label that `seek` has come to.
     #[inline(always)]
-    fn seek(&mut self, label: u8) -> Option<usize> {
-        while self.next < self.to {
-            match self.labels.get(self.next) {
-                Some(&other) if other < label => self.next = self.next.wrapping_add(1),
-                Some(&other) if other == label => return Some(self.next),
-                _ => break,
+    fn label(&self) -> Option<u8> {
+        if self.next < self.to { self.labels.get(usize::from(self.next)).copied() } else { None }
+    }
+
+    /// The index of the node's layer of `label`, or [`NONE`]; labels are asked for in ascending order, as nodes have them.
+    #[inline(always)]
+    fn seek(&mut self, label: u8) -> u16 {
+        while let Some(other) = self.label() {
+            if other >= label {
+                return if other == label { self.next } else { NONE };
             }
+            self.next = self.next.wrapping_add(1);
         }
-        None
+        NONE
     }
 
-    /// Whether the next node has one layer.
-    #[inline(always)]
-    fn single(&self) -> bool {
-        self.ends.as_slice().first().is_some_and(|&end| usize::from(end) == self.to.wrapping_add(1))
-    }
-
-    /// Where the layers of the next `most` nodes end.
-    fn ends(&self, most: usize) -> &'w [u16] {
-        self.ends.as_slice().get(..most).unwrap_or(&[])
-    }
-
-    /// The positions from the next node's on.
-    fn coming(&self) -> &'w [u32] {
-        self.uv.get(self.to..).unwrap_or(&[])
-    }
-
-    /// On to the `nodes`-th node from here, all of which have one layer.
-    fn jump(&mut self, nodes: usize) {
-        self.ends = self.ends.as_slice().get(nodes..).unwrap_or(&[]).iter();
-        self.to = self.to.wrapping_add(nodes);
-        self.from = self.to.wrapping_sub(1);
-    }
-
-    /// The index of the node's layer of `label`.
-    #[must_use]
-    #[inline(always)]
-    pub fn find(&self, label: u8) -> Option<usize> {
-        if self.from < self.to && self.labels.get(self.from) == Some(&label) {
-            return Some(self.from);
-        }
-        self.search(label)
-    }
-
-    /// As `find`, where the label is not the first.
+    /// How many of the next `most` nodes carry a layer of `label` and nothing else, up to the first that does not.
     #[inline(never)]
-    fn search(&self, label: u8) -> Option<usize> {
-        let labels = self.labels.get(self.from..self.to)?;
-        labels.iter().position(|&other| other == label).map(|place| self.from.wrapping_add(place))
+    fn alone(&self, label: u8, most: usize) -> usize {
+        let labels = self.labels.get(usize::from(self.to)..).unwrap_or(&[]);
+        let mut count = 0usize;
+        let mut to = self.to;
+        for (&end, &other) in self.ends.iter().zip(labels).take(most) {
+            to = to.wrapping_add(1);
+            if other != label || end != to {
+                break;
+            }
+            count = count.wrapping_add(1);
+        }
+        count
+    }
+
+    /// Past the next `nodes` nodes, which have a layer each.
+    #[inline(always)]
+    fn jump(&mut self, nodes: usize) {
+        self.ends = self.ends.get(nodes..).unwrap_or(&[]);
+        self.to = self.to.wrapping_add(nodes as u16);
     }
 }
 
@@ -137,16 +135,25 @@ pub struct Around<'k, 'm> {
 
 impl Around<'_, '_> {
     /// The fields of a layer, straight between the interval's keys, Q8 pixels.
+    #[inline(always)]
     fn field(&self, [from, to]: [usize; 2], linear: i32) -> [i16; 2] {
-        let ([a, b], [c, d]) = (self.from.field(from), self.to.field(to));
-        // Distances are at most 2^15 and weights 2^14: the sums fit.
-        let mix = |from: i32, to: i32| {
-            let sum = from.wrapping_mul(ONE.wrapping_sub(linear)).wrapping_add(to.wrapping_mul(linear));
-            // The largest distance, 2^15, is one more than 16 bits hold.
-            (sum >> WEIGHT_BITS).clamp(-32_767, 32_767) as i16
-        };
-        [mix(a, c), mix(b, d)]
+        let [a, b] = &self.from.fields;
+        let [c, d] = &self.to.fields;
+        let code = |codes: &[i8], index: usize| codes.get(index).copied().unwrap_or(0);
+        let [a, b, c, d] = [code(a, from), code(b, from), code(c, to), code(d, to)];
+        // Most layers are never tested, and have none.
+        if a | b | c | d == 0 { [0; 2] } else { [mix(a, c, linear), mix(b, d, linear)] }
     }
+}
+
+/// The field between those that two codes stand for, Q8 pixels.
+#[inline(never)]
+fn mix(from: i8, to: i8, linear: i32) -> i16 {
+    // Distances are at most 2^15 and weights 2^14: the sums fit.
+    let (from, to) = (field_distance(from), field_distance(to));
+    let sum = from.wrapping_mul(ONE.wrapping_sub(linear)).wrapping_add(to.wrapping_mul(linear));
+    // The largest distance, 2^15, is one more than 16 bits hold.
+    (sum >> WEIGHT_BITS).clamp(-32_767, 32_767) as i16
 }
 
 /// The sum of `four` positions times `weights`, in Q15.16, rounded to nearest, ties up; exact where one weight is one. Coordinates of
@@ -164,361 +171,361 @@ const fn blend(four: [KeyUv; 4], [a, b, c, d]: Weights, key_bits: u32) -> Layer 
     Layer { u: u.wrapping_shr(drop), v: v.wrapping_shr(drop) }
 }
 
-/// A walk over the `columns` nodes of `key` from node `first` on; over none without a key.
-fn enter<'k>(key: Option<&'k Key<'_>>, first: usize, columns: usize) -> Walk<'k> {
-    let slices = key.and_then(|key| Some((key.start.get(first..=first.wrapping_add(columns))?, &*key.label, &*key.uv)));
-    let (starts, labels, uv) = slices.unwrap_or_default();
-    Walk::new(starts, labels, uv)
+/// Layers of one label at neighbouring nodes of a row, one at each, which stand side by side in caller's memory.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Chain {
+    /// The first node, and the one after the last.
+    first: u16,
+    end: u16,
+    /// The first layer.
+    at: u16,
+    /// The next chain of the label to the right; [`NONE`]: this is the last.
+    next: u16,
+    label: u16,
 }
 
-/// No layer: see [`NodeRow::right`].
-const NONE: u16 = 0x7fff;
-/// A layer of the same label is at the node to the left.
-const LEFT: u16 = 0x8000;
+impl Chain {
+    /// The first layer and those after it.
+    #[inline(always)]
+    fn of<'l>(&self, points: &'l [Point]) -> &'l [Point] {
+        points.get(usize::from(self.at)..).and_then(|points| points.get(..self.nodes())).unwrap_or(&[])
+    }
 
-/// The partner that `link` names: the layer of the same label at the node to the right.
-#[must_use]
-#[inline]
-pub const fn partner(link: u16) -> Option<u16> {
-    let index = link & !LEFT;
-    if index == NONE { None } else { Some(index) }
+    fn nodes(&self) -> usize {
+        usize::from(self.end.wrapping_sub(self.first))
+    }
 }
 
-/// One row of nodes at one moment, in caller's memory.
+/// One row of nodes at one moment, in caller's memory: label by label, in chains.
 #[derive(Debug)]
 pub struct NodeRow<'m> {
-    /// Where each node's layers start; one entry more than nodes in the row.
-    pub start: &'m mut [u16],
-    /// Labels, ascending at each node.
-    pub label: &'m mut [u8],
-    /// Positions, Q15.16 texels.
-    pub layer: &'m mut [Layer],
-    /// Each layer's partner: which layer of the node to the right has the same label, [`NONE`] if none has; and [`LEFT`].
-    pub right: &'m mut [u16],
-    /// Where space is cubic, the positions halfway between each layer and its partner.
-    pub middle: &'m mut [Layer],
+    /// The chains, and how many there are.
+    pub chain: &'m mut [Chain],
+    /// How many there are.
+    pub chains: usize,
+    /// The first chain of every label, from the left; [`NONE`]: there is none.
+    pub head: &'m mut [u16],
+    /// Positions, Q15.16 texels, chain by chain.
+    pub point: &'m mut [Point],
+    /// Space is cubic: what is halfway between points is wanted.
+    pub cubic: bool,
     /// Fields, Q8 pixels; empty where the bundle has none.
     pub field: &'m mut [[i16; 2]],
 }
 
-/// A row of nodes that is being filled, from left to right.
-struct Filling<'f> {
-    start: &'f mut [u16],
-    label: &'f mut [u8],
-    layer: &'f mut [Layer],
-    right: &'f mut [u16],
-    field: &'f mut [[i16; 2]],
-    /// Layers so far; those of the node before the current one start at `before`, its own at `from`.
-    count: usize,
-    before: usize,
-    from: usize,
+/// Layers of one label at neighbouring nodes, in caller's memory, one at each, which stand side by side in every key that carries them.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Piece {
+    /// Where in each key that there is; [`NONE`]: nowhere, which only outer keys may say.
+    at: [u16; 4],
+    /// How many.
+    nodes: u16,
+    /// The chain that they are part of.
+    chain: u16,
 }
 
-impl<'f> Filling<'f> {
-    fn new(row: &'f mut NodeRow<'_>) -> Self {
-        // Links have 15 bits; all slices are as long as this one.
-        let NodeRow { start, label, layer, right, field, .. } = row;
-        Self { start, label, layer, right, field, count: 0, before: 0, from: 0 }
-    }
+/// A row of nodes that is being filled, from left to right.
+struct Filling<'f, 'm> {
+    row: &'f mut NodeRow<'m>,
+    pieces: &'f mut [Piece],
+    /// Pieces so far.
+    count: usize,
+    /// Layers that there is room for.
+    room: usize,
+}
 
-    /// Begins the node in `column`.
+impl Filling<'_, '_> {
+    /// Puts layers of `label`, one at each of `nodes` nodes from `column` on.
     #[inline(always)]
-    fn begin(&mut self, column: usize) {
-        if let Some(start) = self.start.get_mut(column) {
-            *start = self.count as u16;
-        }
-        (self.before, self.from) = (self.from, self.count);
-    }
-
-    /// Puts a layer, if there is room; its fields where the bundle has such; and links it with its partner at the node before.
-    #[inline(always)]
-    fn put(&mut self, label: u8, layer: Layer, field: impl FnOnce() -> [i16; 2]) {
-        let count = self.count;
-        if count >= usize::from(NONE) {
-            return;
-        }
-        let (Some(label_slot), Some(layer_slot)) = (self.label.get_mut(count), self.layer.get_mut(count)) else { return };
-        (*label_slot, *layer_slot) = (label, layer);
-        if let Some(slot) = self.field.get_mut(count) {
-            *slot = field();
-        }
-        if let Some(slot) = self.right.get_mut(count) {
-            *slot = NONE;
-        }
-        self.join(count);
-        self.count = count.wrapping_add(1);
-    }
-
-    /// Puts what `layer` says for as many nodes from the one in `column` on as have a single layer of one label in all four `walks`, `most` at most;
-    /// the walks step along. Returns how many nodes that were. Most nodes of most pictures are of this kind.
-    #[inline(always)]
-    fn stretch(&mut self, column: usize, most: usize, walks: [&mut Walk<'_>; 4], layer: impl Fn(usize) -> Option<Layer>) -> usize {
-        let [a, b, c, d] = walks;
-        let count = self.count;
-        // In front of nodes stands where their layers end.
-        let upcoming = |walk: &Walk<'_>| walk.ends.as_slice().len().min(walk.labels.len().saturating_sub(walk.to));
-        let room = self.label.len().min(self.layer.len()).min(self.right.len()).min(usize::from(NONE)).saturating_sub(count);
-        let most = most.min(room).min(self.start.len().saturating_sub(column));
-        let most = most.min(upcoming(a)).min(upcoming(b)).min(upcoming(c)).min(upcoming(d));
-        let (ends_a, ends_b, ends_c, ends_d) = (a.ends(most), b.ends(most), c.ends(most), d.ends(most));
-        let Some(labels_a) = a.labels.get(a.to..a.to.wrapping_add(most)) else { return 0 };
-        let Some(labels_b) = b.labels.get(b.to..b.to.wrapping_add(most)) else { return 0 };
-        let Some(labels_c) = c.labels.get(c.to..c.to.wrapping_add(most)) else { return 0 };
-        let Some(labels_d) = d.labels.get(d.to..d.to.wrapping_add(most)) else { return 0 };
-        let (before, from) = (self.from, self.count);
-        let until = count.wrapping_add(most);
-        let Some(starts) = self.start.get_mut(column..column.wrapping_add(most)) else { return 0 };
-        let (Some(label_slots), Some(layer_slots)) = (self.label.get_mut(count..until), self.layer.get_mut(count..until)) else { return 0 };
-        let Some(links) = self.right.get_mut(count..until) else { return 0 };
-        // The first one's partner may be any layer of the node before.
-        let (mut label_before, mut link) = (None, NONE);
-        let mut done = 0usize;
-        while done < most {
-            let passed = done.wrapping_add(1);
-            let one = |ends: &[u16], to: usize| ends.get(done).is_some_and(|&end| usize::from(end).wrapping_sub(to) == passed);
-            if !(one(ends_a, a.to) && one(ends_b, b.to) && one(ends_c, c.to) && one(ends_d, d.to)) {
-                break;
+    fn put(&mut self, label: u8, column: u16, nodes: u16, at: [u16; 4]) {
+        let Some(left) = self.room.checked_sub(nodes.into()) else { return };
+        let Some(last) = self.row.head.get_mut(usize::from(label)) else { return };
+        let Some(piece) = self.pieces.get_mut(self.count) else { return };
+        let end = column.wrapping_add(nodes);
+        match self.row.chain.get_mut(usize::from(*last)) {
+            Some(chain) if chain.end == column => chain.end = end,
+            _ => {
+                let Some(slot) = self.row.chain.get_mut(self.row.chains) else { return };
+                *slot = Chain { first: column, end, at: 0, next: NONE, label: label.into() };
+                *last = self.row.chains as u16;
+                self.row.chains = self.row.chains.wrapping_add(1);
             }
-            let Some(&label) = labels_b.get(done) else { break };
-            let same = |labels: &[u8]| labels.get(done) == Some(&label);
-            if !(same(labels_a) && same(labels_c) && same(labels_d)) {
-                break;
-            }
-            let Some(layer) = layer(done) else { break };
-            let index = count.wrapping_add(done) as u16;
-            let (Some(start), Some(label_slot), Some(layer_slot)) =
-                (starts.get_mut(done), label_slots.get_mut(done), layer_slots.get_mut(done))
-            else {
-                break;
-            };
-            (*start, *label_slot, *layer_slot) = (index, label, layer);
-            let partner = label_before == Some(label);
-            if let Some(left) = links.get_mut(done.wrapping_sub(1)) {
-                *left = if partner { link & LEFT | index } else { link };
-            }
-            link = if partner { LEFT | NONE } else { NONE };
-            label_before = Some(label);
-            done = passed;
         }
-        if done == 0 {
-            return 0;
-        }
-        if let Some(last) = links.get_mut(done.wrapping_sub(1)) {
-            *last = link;
-        }
-        for walk in [a, b, c, d] {
-            walk.jump(done);
-        }
-        self.count = count.wrapping_add(done);
-        (self.before, self.from) = (before, from);
-        self.join(count);
-        self.from = self.count.wrapping_sub(1);
-        done
+        *piece = Piece { at, nodes, chain: *last };
+        (self.count, self.room) = (self.count.wrapping_add(1), left);
     }
 
-    /// Links layer `index` with its partner at the node before.
-    #[inline(always)]
-    fn join(&mut self, index: usize) {
-        let Some(&label) = self.label.get(index) else { return };
-        let mut partner = self.before;
-        // Most often the first one is it.
-        while partner < self.from {
-            if self.label.get(partner) == Some(&label) {
-                if let Some(left) = self.right.get_mut(partner) {
-                    *left = *left & LEFT | index as u16;
+    /// Finds the layers that both ends of the interval carry in the row of `columns` nodes from node `first` on; returns the pieces.
+    #[inline(never)]
+    fn gather(mut self, keys: &Around<'_, '_>, first: usize, columns: usize) -> usize {
+        let [mut before, mut from, mut to, mut after] =
+            [keys.before, Some(keys.from), Some(keys.to), keys.after].map(|key| Walk::new(key, first, columns));
+        let mut column = 0usize;
+        while column < columns {
+            // Most nodes of most pictures carry one layer, of the same label as the node before.
+            if let Some(&label) = from.labels.get(usize::from(from.to))
+                && from.ends.first() == Some(&from.to.wrapping_add(1))
+            {
+                let mut most = columns.wrapping_sub(column);
+                for (walk, wanted) in [(&from, true), (&to, true), (&before, keys.before.is_some()), (&after, keys.after.is_some())] {
+                    most = if wanted && most > 0 { walk.alone(label, most) } else { most };
                 }
-                if let Some(slot) = self.right.get_mut(index) {
-                    *slot |= LEFT;
+                if most > 0 {
+                    self.put(label, column as u16, most as u16, [before.to, from.to, to.to, after.to]);
+                    for walk in [&mut before, &mut from, &mut to, &mut after] {
+                        walk.jump(most);
+                    }
+                    column = column.wrapping_add(most);
+                    continue;
                 }
-                return;
             }
-            partner = partner.wrapping_add(1);
+            for walk in [&mut before, &mut from, &mut to, &mut after] {
+                walk.step();
+            }
+            while let Some(label) = from.label() {
+                let index = from.next;
+                from.next = from.next.wrapping_add(1);
+                let other = to.seek(label);
+                if other != NONE {
+                    self.put(label, column as u16, 1, [before.seek(label), index, other, after.seek(label)]);
+                }
+            }
+            column = column.wrapping_add(1);
         }
-    }
-
-    /// Ends the row after `columns` nodes; returns how many layers it has.
-    fn end(mut self, columns: usize) -> usize {
-        self.begin(columns);
         self.count
     }
 }
 
-impl NodeRow<'_> {
+impl<'m> NodeRow<'m> {
     /// Fills the row with the layers that both ends of the interval carry in row `row` of the grid's nodes, weighted; with none
-    /// outside the grid. Returns how many there are.
-    #[inline(never)]
-    pub fn fill(&mut self, grid: Grid, row: Option<usize>, keys: &Around<'_, '_>, moment: &Moment) -> u32 {
-        let Some(row) = row.filter(|&row| row < grid.node_rows()) else {
-            self.start.fill(0);
-            return 0;
-        };
-        let (linear, key_bits) = (moment.linear, keys.key_bits);
+    /// outside the grid. Returns how many there are. `pieces` is room for as many as there are layers.
+    pub fn fill(&mut self, pieces: &mut [Piece], grid: Grid, row: Option<usize>, keys: &Around<'_, '_>, moment: &Moment) -> u32 {
+        self.head.fill(NONE);
+        self.chains = 0;
+        let Some(row) = row.filter(|&row| row < grid.node_rows()) else { return 0 };
         let columns = grid.node_columns();
-        let first = row.wrapping_mul(columns);
-        let (mut from, mut to) = (enter(Some(keys.from), first, columns), enter(Some(keys.to), first, columns));
-        let (mut before, mut after) = (enter(keys.before, first, columns), enter(keys.after, first, columns));
-        let [both, no_first, no_last, neither] = &moment.weights;
-        // Where there is no outer key, its weight is none: any other does in its place.
-        let whole = match (keys.before, keys.after) {
-            (Some(_), Some(_)) => both,
-            (None, Some(_)) => no_first,
-            (Some(_), None) => no_last,
-            (None, None) => neither,
-        };
-        let mut row = Filling::new(self);
-        let mut column = 0usize;
-        while column < columns {
-            if from.single() && to.single() {
-                let (mut instead_before, mut instead_after) = (from.clone(), to.clone());
-                let first = if keys.before.is_some() { &mut before } else { &mut instead_before };
-                let last = if keys.after.is_some() { &mut after } else { &mut instead_after };
-                let most = columns.wrapping_sub(column);
-                let (leave, arrive, filled) = (from.to, to.to, row.count);
-                let uv = [&*first, &from, &to, &*last].map(|walk| walk.coming());
-                let [a, b, c, d] = uv;
-                let layer = |index: usize| {
-                    let at = |uv: &[u32]| uv.get(index).map(|&uv| KeyUv(uv));
-                    Some(blend([at(a)?, at(b)?, at(c)?, at(d)?], *whole, key_bits))
-                };
-                let done = row.stretch(column, most, [first, &mut from, &mut to, last], layer);
-                for index in 0..done {
-                    let Some(slot) = row.field.get_mut(filled.wrapping_add(index)) else { break };
-                    *slot = keys.field([leave.wrapping_add(index), arrive.wrapping_add(index)], linear);
-                }
-                column = column.wrapping_add(done);
-                if done > 0 {
-                    continue;
-                }
-            }
-            row.begin(column);
-            from.step();
-            to.step();
-            before.step();
-            after.step();
-            for index in from.from..from.to {
-                let Some(&label) = from.labels.get(index) else { break };
-                let Some(other) = to.seek(label) else { continue };
-                let at = |key: &Walk<'_>, index: usize| KeyUv(key.uv.get(index).copied().unwrap_or(0));
-                let (leave, arrive) = (before.seek(label), after.seek(label));
-                let [middle, next] = [at(&from, index), at(&to, other)];
-                let layer = match (leave, arrive) {
-                    (Some(a), Some(b)) => blend([at(&before, a), middle, next, at(&after, b)], *both, key_bits),
-                    (None, Some(b)) => blend([KeyUv(0), middle, next, at(&after, b)], *no_first, key_bits),
-                    (Some(a), None) => blend([at(&before, a), middle, next, KeyUv(0)], *no_last, key_bits),
-                    (None, None) => blend([KeyUv(0), middle, next, KeyUv(0)], *neither, key_bits),
-                };
-                row.put(label, layer, || keys.field([index, other], linear));
-            }
-            column = column.wrapping_add(1);
+        let room = self.point.len().min(usize::from(NONE));
+        let filling = Filling { row: self, pieces: &mut *pieces, count: 0, room };
+        let count = filling.gather(keys, row.wrapping_mul(columns), columns);
+        let mut at = 0u16;
+        for chain in self.chain.get_mut(..self.chains).unwrap_or(&mut []) {
+            // Until chains are linked, `next` is where the chain's next layer goes.
+            (chain.at, chain.next) = (at, at);
+            at = at.wrapping_add(chain.nodes() as u16);
         }
-        let count = row.end(columns);
-        self.halve(count);
-        count as u32
+        self.weigh(pieces.get(..count).unwrap_or(&[]), keys, moment);
+        self.link();
+        self.halve();
+        at.into()
+    }
+
+    /// Works out the layers of `pieces`.
+    #[inline(never)]
+    fn weigh(&mut self, pieces: &[Piece], keys: &Around<'_, '_>, moment: &Moment) {
+        let [both, no_first, no_last, neither] = &moment.weights;
+        let chains = self.chain.get_mut(..self.chains).unwrap_or(&mut []);
+        let [start, end] = [keys.before, keys.after].map(|key| key.map_or(&[][..], |key| &*key.uv));
+        let (from, to) = (&*keys.from.uv, &*keys.to.uv);
+        for piece in pieces {
+            let Some(chain) = chains.get_mut(usize::from(piece.chain)) else { break };
+            let place = usize::from(chain.next);
+            chain.next = chain.next.wrapping_add(piece.nodes);
+            let [mut a, mut b, mut c, mut d] = piece.at.map(usize::from);
+            let weights = match (a < start.len(), d < end.len()) {
+                (true, true) => both,
+                (false, true) => no_first,
+                (true, false) => no_last,
+                (false, false) => neither,
+            };
+            for slot in self.point.get_mut(place..).unwrap_or(&mut []).iter_mut().take(usize::from(piece.nodes)) {
+                // An outer key that has none weighs nothing.
+                let [first, last] = [(start, a), (end, d)].map(|(uv, at)| KeyUv(uv.get(at).copied().unwrap_or(0)));
+                let (Some(&leave), Some(&arrive)) = (from.get(b), to.get(c)) else { break };
+                slot.at = blend([first, KeyUv(leave), KeyUv(arrive), last], *weights, keys.key_bits);
+                [a, b, c, d] = [a, b, c, d].map(|at| at.wrapping_add(1));
+            }
+        }
+        if !self.field.is_empty() {
+            self.distances(pieces, keys, moment.linear);
+        }
+    }
+
+    /// Works out the fields of `pieces`.
+    #[inline(never)]
+    fn distances(&mut self, pieces: &[Piece], keys: &Around<'_, '_>, linear: i32) {
+        let chains = self.chain.get_mut(..self.chains).unwrap_or(&mut []);
+        for chain in &mut *chains {
+            chain.next = chain.at;
+        }
+        for piece in pieces {
+            let Some(chain) = chains.get_mut(usize::from(piece.chain)) else { break };
+            let place = usize::from(chain.next);
+            chain.next = chain.next.wrapping_add(piece.nodes);
+            let [_, mut from, mut to, _] = piece.at.map(usize::from);
+            for slot in self.field.get_mut(place..).unwrap_or(&mut []).iter_mut().take(usize::from(piece.nodes)) {
+                *slot = keys.field([from, to], linear);
+                (from, to) = (from.wrapping_add(1), to.wrapping_add(1));
+            }
+        }
     }
 
     /// Fills the row with what lies halfway between rows `from` and `to`, where both carry it; `before` and `after` are the rows
     /// around these. Returns how many layers there are.
     #[inline(never)]
-    pub fn between(&mut self, columns: usize, [before, from, to, after]: [&NodeRow<'_>; 4]) -> u32 {
-        let [mut first, mut upper, mut lower, mut last] = [before, from, to, after].map(NodeRow::walk);
-        let [first_layers, upper_layers, lower_layers, last_layers] = [before, from, to, after].map(|row| &*row.layer);
-        let mut row = Filling::new(self);
-        let mut column = 0usize;
-        while column < columns {
-            if upper.single() && lower.single() {
-                let most = columns.wrapping_sub(column);
-                let cut = [(first_layers, &first), (upper_layers, &upper), (lower_layers, &lower), (last_layers, &last)]
-                    .map(|(layers, walk)| layers.get(walk.to..).unwrap_or(&[]));
-                let [a, b, c, d] = cut;
-                let layer = |index: usize| {
-                    let at = |layers: &[Layer]| layers.get(index).copied();
-                    Some(Layer::middle(Some(at(a)?), at(b)?, at(c)?, Some(at(d)?)))
-                };
-                let done = row.stretch(column, most, [&mut first, &mut upper, &mut lower, &mut last], layer);
-                column = column.wrapping_add(done);
-                if done > 0 {
+    pub fn between(&mut self, [before, from, to, after]: [&NodeRow<'_>; 4]) -> u32 {
+        self.head.fill(NONE);
+        self.chains = 0;
+        let mut count = 0usize;
+        for upper in from.chain.get(..from.chains).unwrap_or(&[]) {
+            let mut next = to.head.get(usize::from(upper.label)).copied().unwrap_or(NONE);
+            while let Some(lower) = to.chain.get(usize::from(next)) {
+                next = lower.next;
+                let (first, end) = (upper.first.max(lower.first), upper.end.min(lower.end));
+                if first >= end {
                     continue;
                 }
+                let Some(slot) = self.chain.get_mut(self.chains) else { break };
+                *slot = Chain { first, end, at: count as u16, next: NONE, label: upper.label };
+                self.chains = self.chains.wrapping_add(1);
+                let Some(slots) = self.point.get_mut(count..).and_then(|points| points.get_mut(..slot.nodes())) else { break };
+                count = count.wrapping_add(slots.len());
+                let (mut slots, mut column) = (slots, first);
+                let mut from = cut(upper, from.point, first);
+                let mut to = cut(lower, to.point, first);
+                while !slots.is_empty() {
+                    let ((above, high), (below, low)) = (before.part(upper.label, column), after.part(upper.label, column));
+                    let stop = end.min(high).min(low);
+                    let length = usize::from(stop.wrapping_sub(column));
+                    let (some, rest) = slots.split_at_mut(slots.len().min(length));
+                    let Some(((here, from_rest), (there, to_rest))) = from.split_at_checked(length).zip(to.split_at_checked(length)) else {
+                        break;
+                    };
+                    middles(some, here, there, above, below);
+                    (slots, from, to, column) = (rest, from_rest, to_rest, stop);
+                }
             }
-            row.begin(column);
-            first.step();
-            upper.step();
-            lower.step();
-            last.step();
-            for index in upper.from..upper.to {
-                let Some(&label) = upper.labels.get(index) else { break };
-                let Some(below) = lower.seek(label) else { continue };
-                let above = first.seek(label).and_then(|at| first_layers.get(at));
-                let under = last.seek(label).and_then(|at| last_layers.get(at));
-                let (Some(&here), Some(&there)) = (upper_layers.get(index), lower_layers.get(below)) else { break };
-                // Fields are straight from node to node: nothing asks for them here.
-                row.put(label, Layer::middle(above.copied(), here, there, under.copied()), || [0; 2]);
-            }
-            column = column.wrapping_add(1);
         }
-        let count = row.end(columns);
-        self.halve(count);
+        self.link();
+        self.halve();
         count as u32
     }
 
-    /// A walk over the row's nodes.
-    #[must_use]
-    pub fn walk(&self) -> Walk<'_> {
-        Walk::new(self.start, self.label, &[])
+    /// The layers of `label` from node `column` on, and the node where that ends: that they do, or that there are none. Where there are none,
+    /// the slice is empty.
+    fn part(&self, label: u16, column: u16) -> (&[Point], u16) {
+        let mut next = self.head.get(usize::from(label)).copied().unwrap_or(NONE);
+        while let Some(chain) = self.chain.get(usize::from(next)) {
+            if column < chain.first {
+                return (&[], chain.first);
+            }
+            if column < chain.end {
+                return (cut(chain, self.point, column), chain.end);
+            }
+            next = chain.next;
+        }
+        (&[], u16::MAX)
     }
 
-    /// Works out what lies halfway between each of `count` layers and its partner, where there is room for it.
-    #[inline(never)]
-    fn halve(&mut self, count: usize) {
-        let (Some(links), Some(layers)) = (self.right.get(..count), self.layer.get(..count)) else { return };
-        let Some(middles) = self.middle.get_mut(..count) else { return };
-        for (start, link) in links.iter().enumerate() {
-            // Chains of partners start where there is none to the left.
-            if link & LEFT != 0 {
-                continue;
+    /// Links the chains of each label, from left to right.
+    fn link(&mut self) {
+        let chains = self.chain.get_mut(..self.chains).unwrap_or(&mut []);
+        for chain in &*chains {
+            if let Some(head) = self.head.get_mut(usize::from(chain.label)) {
+                *head = NONE;
             }
-            let Some(&first) = layers.get(start) else { break };
-            let mut index = start;
-            let (mut before, mut from) = (None, first);
-            let mut partner = usize::from(link & !LEFT);
-            let mut next = layers.get(partner);
-            while let Some(&to) = next {
-                let beyond = links.get(partner).map_or(usize::MAX, |link| usize::from(link & !LEFT));
-                next = layers.get(beyond);
-                if let Some(slot) = middles.get_mut(index) {
-                    *slot = Layer::middle(before, from, to, next.copied());
-                }
-                (before, from) = (Some(from), to);
-                (index, partner) = (partner, beyond);
+        }
+        for (index, chain) in chains.iter_mut().enumerate().rev() {
+            if let Some(head) = self.head.get_mut(usize::from(chain.label)) {
+                (chain.next, *head) = (*head, index as u16);
             }
         }
     }
 
-    /// Every layer's link to its partner: see [`partner`].
-    #[must_use]
-    pub const fn links(&self) -> &[u16] {
-        self.right
+    /// Works out what lies halfway between each layer and the next one of its chain, where that is wanted.
+    #[inline(never)]
+    fn halve(&mut self) {
+        if !self.cubic {
+            return;
+        }
+        let mut points = &mut *self.point;
+        for chain in self.chain.get(..self.chains).unwrap_or(&[]) {
+            let Some((mine, rest)) = points.split_at_mut_checked(chain.nodes()) else { break };
+            points = rest;
+            // Each point waits for two more.
+            let mut mine = mine.iter_mut();
+            let (Some(mut last), Some(mut here)) = (mine.next(), mine.next()) else { continue };
+            let mut before = None;
+            for next in mine {
+                last.middle = Layer::middle(before, last.at, here.at, Some(next.at));
+                before = Some(last.at);
+                (last, here) = (here, next);
+            }
+            last.middle = Layer::middle(before, last.at, here.at, None);
+        }
     }
 
-    /// The fields of layer `index`; those of one that shows everywhere where the bundle has none.
+    /// Where the layers of `label` at node `column` and at the one to the right of it stand, and how many of its chain are to the right; `None` where there is none.
     #[must_use]
-    #[inline]
-    pub fn field(&self, index: u16) -> [i16; 2] {
-        self.field.get(usize::from(index)).copied().unwrap_or([1, 1])
+    pub fn find(&self, label: u8, column: usize) -> Option<[u16; 2]> {
+        let column = column as u16;
+        let mut next = *self.head.get(usize::from(label))?;
+        while let Some(chain) = self.chain.get(usize::from(next)) {
+            if column.wrapping_add(1) < chain.end {
+                let along = column.checked_sub(chain.first)?;
+                return Some([chain.at.wrapping_add(along), chain.end.wrapping_sub(column).wrapping_sub(1)]);
+            }
+            next = chain.next;
+        }
+        None
     }
 
-    /// Layer `index`.
+    /// The fields of layer `index` and of the next one of its chain; those of layers that show everywhere where the bundle has none.
     #[must_use]
-    #[inline]
-    pub fn layer(&self, index: u16) -> Layer {
-        self.layer.get(usize::from(index)).copied().unwrap_or_default()
+    #[inline(always)]
+    pub fn fields(&self, index: u16) -> [[i16; 2]; 2] {
+        self.field.get(usize::from(index)..).and_then(<[_]>::first_chunk).copied().unwrap_or([[1, 1]; 2])
     }
 
-    /// What lies halfway from layer `index` to its partner.
+    /// Layer `index` and the next one of its chain.
     #[must_use]
-    #[inline]
-    pub fn halfway(&self, index: u16) -> Layer {
-        self.middle.get(usize::from(index)).copied().unwrap_or_default()
+    #[inline(always)]
+    pub fn pair(&self, index: u16) -> &[Point; 2] {
+        const NONE: &[Point; 2] = &[Point { at: Layer { u: 0, v: 0 }, middle: Layer { u: 0, v: 0 } }; 2];
+        self.point.get(usize::from(index)..).and_then(<[_]>::first_chunk).unwrap_or(NONE)
+    }
+}
+
+/// The layers of `chain` from node `column` on, which it has.
+fn cut<'l>(chain: &Chain, points: &'l [Point], column: u16) -> &'l [Point] {
+    chain.of(points).get(usize::from(column.wrapping_sub(chain.first))..).unwrap_or(&[])
+}
+
+/// Fills `slots` with what lies halfway between `from` and `to`; `before` and `after` are what comes before and after, or empty.
+fn middles(slots: &mut [Point], from: &[Point], to: &[Point], before: &[Point], after: &[Point]) {
+    let inner = slots.iter_mut().zip(from.iter().zip(to));
+    match (before.is_empty(), after.is_empty()) {
+        (false, false) => {
+            for ((slot, (from, to)), (before, after)) in inner.zip(before.iter().zip(after)) {
+                slot.at = Layer::middle(Some(before.at), from.at, to.at, Some(after.at));
+            }
+        }
+        (false, true) => {
+            for ((slot, (from, to)), before) in inner.zip(before) {
+                slot.at = Layer::middle(Some(before.at), from.at, to.at, None);
+            }
+        }
+        (true, false) => {
+            for ((slot, (from, to)), after) in inner.zip(after) {
+                slot.at = Layer::middle(None, from.at, to.at, Some(after.at));
+            }
+        }
+        (true, true) => {
+            for (slot, (from, to)) in inner {
+                slot.at = Layer::middle(None, from.at, to.at, None);
+            }
+        }
     }
 }
 

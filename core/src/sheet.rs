@@ -4,15 +4,15 @@
 use crate::fixed::PlayUv;
 use crate::grid::Grid;
 use crate::lists::Lists;
-use crate::row::{Layer, NodeRow, Walk, partner};
+use crate::row::NodeRow;
 
-/// One sheet of a cell, in caller's memory: its label, its test, and where its layers at the cell's left and right edge stand in the rows
-/// above, halfway down and below. Halfway there is only where space is cubic.
+/// One sheet of a cell, in caller's memory: its label, its test, and where its layer at the cell's left edge stands in the rows
+/// above, halfway down and below; that at the right edge is the next. Halfway there is only where space is cubic.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Sheet {
-    /// Above, halfway down, below: left and right.
-    nodes: [[u16; 2]; 3],
+    /// Above, halfway down, below.
+    nodes: [u16; 3],
     label: u8,
     test: u8,
 }
@@ -24,11 +24,10 @@ impl Sheet {
         self.label
     }
 
-    /// Its layers at the cell's left and right edge in row `place` of the three.
+    /// Its layers at the cell's left edge: above, halfway down, below.
     #[must_use]
-    #[inline(always)]
-    pub fn nodes(&self, place: usize) -> Option<[u16; 2]> {
-        self.nodes.get(place).copied()
+    pub const fn nodes(&self) -> [u16; 3] {
+        self.nodes
     }
 
     /// The sheet's coverage test: one of [`crate::lists`]'s.
@@ -36,19 +35,48 @@ impl Sheet {
     pub const fn test(&self) -> u16 {
         self.test as u16
     }
+
+    /// The same sheet in the `cells`-th cell to the right.
+    #[must_use]
+    #[inline(always)]
+    pub fn further(&self, cells: u16) -> Self {
+        Self { nodes: self.nodes.map(|node| node.wrapping_add(cells)), ..*self }
+    }
+}
+
+/// Neighbouring cells that show the same sheet, or one cell that shows any number of them, in caller's memory.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Stretch {
+    /// How many cells.
+    pub cells: u16,
+    /// The first sheet, of the first cell.
+    pub sheet: u16,
+    /// How many sheets.
+    pub sheets: u16,
 }
 
 /// The sheets of a row of cells, in caller's memory.
 #[derive(Debug)]
 pub struct RowSheets<'m> {
-    /// Where each cell's sheets start; one entry more than cells in the row.
-    pub start: &'m mut [u16],
+    /// The cells, from left to right: as much room as there are cells.
+    pub stretch: &'m mut [Stretch],
+    /// How many stretches there are.
+    pub stretches: usize,
     /// Front to back.
     pub sheet: &'m mut [Sheet],
 }
 
 /// The rows of nodes that bound a row of cells: above, halfway down, below. Where space is linear, the middle one is not looked at.
 pub type Rows<'r, 'm> = [&'r NodeRow<'m>; 3];
+
+/// The sheet of `label` in the cell in `column`, and in how many cells from there on it has corners.
+fn look_up([top, halfway, bottom]: Rows<'_, '_>, cubic: bool, label: u8, test: u8, column: usize) -> Option<(Sheet, u16)> {
+    let ([above, high], [below, low]) = (top.find(label, column)?, bottom.find(label, column)?);
+    // Halfway down there is a layer wherever there is one above and below.
+    let [between, _] = if cubic { halfway.find(label, column)? } else { [0; 2] };
+    Some((Sheet { nodes: [above, between, below], label, test }, high.min(low)))
+}
 
 impl RowSheets<'_> {
     /// Looks up the corners of every sheet that `lists` names in `row`. A sheet without a layer at a corner is left out:
@@ -57,45 +85,43 @@ impl RowSheets<'_> {
     pub fn fill(&mut self, grid: Grid, row: usize, lists: &Lists<'_>, rows: Rows<'_, '_>, cubic: bool) {
         let mut cursor = lists.row(row);
         let mut count = 0usize;
-        let [mut above, mut between, mut below] = rows.map(NodeRow::walk);
-        let [top, middle, bottom] = rows.map(NodeRow::links);
-        for start in self.start.iter_mut().take(grid.columns) {
-            *start = count as u16;
-            above.step();
-            between.step();
-            below.step();
+        let mut column = 0usize;
+        self.stretches = 0;
+        for stretch in self.stretch.iter_mut() {
+            let Some(left) = grid.columns.checked_sub(column).filter(|&left| left > 0) else { break };
             let listed = lists.sheets(cursor);
+            let first = count;
+            let mut cells = 1usize;
+            cursor = cursor.past(listed);
             for (index, &label) in listed.labels.iter().enumerate() {
-                // Halfway down there is a layer wherever there is one above and below.
-                let halfway = if cubic { corner(&between, middle, label) } else { Some([0, 0]) };
-                if let (Some(above), Some(halfway), Some(below)) = (corner(&above, top, label), halfway, corner(&below, bottom, label))
-                    && let Some(sheet) = self.sheet.get_mut(count)
-                {
-                    *sheet = Sheet { nodes: [above, halfway, below], label, test: listed.test(index) as u8 };
-                    count = count.wrapping_add(1);
+                let found = look_up(rows, cubic, label, listed.test(index) as u8, column);
+                let Some(((sheet, most), slot)) = found.zip(self.sheet.get_mut(count)) else { continue };
+                *slot = sheet;
+                count = count.wrapping_add(1);
+                if listed.labels.len() == 1 {
+                    let more = usize::from(most).min(left).saturating_sub(1);
+                    (cells, cursor) = lists.alike(cursor, label, more);
+                    cells = cells.wrapping_add(1);
                 }
             }
-            cursor = cursor.next(lists);
-        }
-        if let Some(start) = self.start.get_mut(grid.columns) {
-            *start = count as u16;
+            *stretch = Stretch { cells: cells as u16, sheet: first as u16, sheets: count.wrapping_sub(first) as u16 };
+            self.stretches = self.stretches.wrapping_add(1);
+            column = column.wrapping_add(cells);
         }
     }
 
-    /// The sheets of the cell in `column`, front to back, and the index of the first.
+    /// The stretches, from left to right.
     #[must_use]
-    pub fn cell(&self, column: usize) -> (usize, &[Sheet]) {
-        let at = |column: usize| self.start.get(column).map_or(0, |&at| usize::from(at));
-        let from = at(column);
-        (from, self.sheet.get(from..at(column.wrapping_add(1))).unwrap_or(&[]))
+    pub fn stretches(&self) -> &[Stretch] {
+        self.stretch.get(..self.stretches).unwrap_or(&[])
     }
-}
 
-/// The layers of `label` at a node of a row and at the one to the right of it.
-#[inline(always)]
-fn corner(walk: &Walk<'_>, links: &[u16], label: u8) -> Option<[u16; 2]> {
-    let left = walk.find(label)?;
-    Some([left as u16, partner(*links.get(left)?)?])
+    /// The sheets of a stretch's first cell, front to back.
+    #[must_use]
+    pub fn of(&self, stretch: Stretch) -> &[Sheet] {
+        let from = usize::from(stretch.sheet);
+        self.sheet.get(from..from.wrapping_add(stretch.sheets.into())).unwrap_or(&[])
+    }
 }
 
 /// A block of a cell: all of it, or a quarter where space is cubic; with straight lines in between.
@@ -116,16 +142,19 @@ impl Block<'_, '_> {
     #[inline(always)]
     pub fn corners(&self, sheet: &Sheet) -> Corners {
         let [top, halfway, bottom] = self.rows;
-        let [[a, d], [b, e], [c, f]] = sheet.nodes;
+        let [a, b, c] = sheet.nodes;
         let Some([right, lower]) = self.quarter else {
-            return [top.layer(a), top.layer(d), bottom.layer(c), bottom.layer(f)].map(Layer::uv);
+            let edge = |row: &NodeRow<'_>, left: u16| row.pair(left).map(|point| point.at.uv());
+            let ([a, b], [c, d]) = (edge(top, a), edge(bottom, c));
+            return [a, b, c, d];
         };
-        let (above, below) = if lower { ((halfway, b, e), (bottom, c, f)) } else { ((top, a, d), (halfway, b, e)) };
-        let edge = |(row, left, partner): (&NodeRow<'_>, u16, u16)| {
-            if right { [row.halfway(left), row.layer(partner)] } else { [row.layer(left), row.halfway(left)] }
+        let (above, below) = if lower { ((halfway, b), (bottom, c)) } else { ((top, a), (halfway, b)) };
+        let edge = |(row, left): (&NodeRow<'_>, u16)| {
+            let [from, to] = row.pair(left);
+            if right { [from.middle, to.at] } else { [from.at, from.middle] }
         };
         let ([a, b], [c, d]) = (edge(above), edge(below));
-        [a, b, c, d].map(Layer::uv)
+        [a, b, c, d].map(|layer| layer.uv())
     }
 
     /// Field `which` of `sheet` at the cell's corners, Q16 pixels: straight from edge to edge of the cell, whatever space is.
@@ -133,8 +162,9 @@ impl Block<'_, '_> {
     #[inline(always)]
     pub fn field(&self, sheet: &Sheet, which: usize) -> [i32; 4] {
         let [top, _, bottom] = self.rows;
-        let [[a, d], _, [c, f]] = sheet.nodes;
+        let [a, _, c] = sheet.nodes;
         let wide = |fields: [i16; 2]| i32::from(if which == 0 { fields[0] } else { fields[1] }).wrapping_shl(8);
-        [top.field(a), top.field(d), bottom.field(c), bottom.field(f)].map(wide)
+        let ([a, b], [c, d]) = (top.fields(a), bottom.fields(c));
+        [a, b, c, d].map(wide)
     }
 }

@@ -116,12 +116,17 @@ pub struct Span {
 }
 
 /// The value `step` / 2^`log2` of the way from `from` to `to`, rounded down.
+#[inline(always)]
 const fn down(from: i32, to: i32, step: u32, log2: u32) -> i32 {
-    // In two parts, because the product does not fit.
     let far = to.wrapping_sub(from);
+    let rows = step as i32;
+    // Positions differ by less than 2^28.6.
+    if log2 <= 2 {
+        return from.wrapping_add(far.wrapping_mul(rows) >> log2);
+    }
+    // In two parts, because the product does not fit.
     let rest = far & 1i32.wrapping_shl(log2).wrapping_sub(1);
-    let step = step as i32;
-    from.wrapping_add((far >> log2).wrapping_mul(step)).wrapping_add(rest.wrapping_mul(step) >> log2)
+    from.wrapping_add((far >> log2).wrapping_mul(rows)).wrapping_add(rest.wrapping_mul(rows) >> log2)
 }
 
 impl Span {
@@ -191,16 +196,18 @@ impl Field {
     /// The field of row `row` of a cell of 2^`log2` pixels from pixel `first` on, given what it is at the cell's corners, Q16 pixels.
     #[must_use]
     #[inline(always)]
-    pub const fn new([a, b, c, d]: [i32; 4], row: u32, log2: u32, first: u32) -> Self {
+    pub fn new([a, b, c, d]: [i32; 4], row: u32, log2: u32, first: u32) -> Self {
         let half = (1i32 << log2) >> 1;
-        let (from, to) = (down(a, c, row, log2), down(b, d, row, log2));
+        // Fields differ by less than 2^24; there are at most 2^5 rows, or quarters of 2^7: the product fits.
+        let down = |from: i32, to: i32| from.wrapping_add(to.wrapping_sub(from).wrapping_mul(row as i32) >> log2);
+        let (from, to) = (down(a, c), down(b, d));
         let step = to.wrapping_sub(from).wrapping_add(half) >> log2;
         Self { from: from.wrapping_add(step.wrapping_mul(first as i32)), step }
     }
 
     /// Like [`Field::new`], `across` and `down` quarters of a pixel beside the pixels' centres.
     #[must_use]
-    pub const fn beside(corners: [i32; 4], row: u32, log2: u32, first: u32, [across, down]: [i32; 2]) -> Self {
+    pub fn beside(corners: [i32; 4], row: u32, log2: u32, first: u32, [across, down]: [i32; 2]) -> Self {
         let first = first.wrapping_mul(4).wrapping_add_signed(across);
         let Self { from, step } = Self::new(corners, row.wrapping_mul(4).wrapping_add_signed(down), log2.wrapping_add(2), first);
         Self { from, step: step.wrapping_mul(4) }

@@ -12,6 +12,7 @@
 //! }
 //! ```
 
+use crate::Bundle;
 use crate::atlas::Texture;
 use crate::coder::Decoder;
 use crate::draw::{Paint, mean};
@@ -21,7 +22,6 @@ use crate::pack::{self, Picture, Scratch};
 use crate::plan::{Edge, Run};
 use crate::playing::{Look, Playing};
 use crate::span::{self, Packed};
-use crate::{Bundle, MemoryError};
 
 /// A kind of texels, or several, that a [`crate::Player`] plays: [`Indexed8`], [`Indexed4`], [`Direct565`] or [`AnyTexels`].
 pub trait Texels: Source {}
@@ -31,8 +31,11 @@ impl<T: Source> Texels for T {}
 /// What the player asks of kinds of texels. Nothing outside of the crate can name it, so that there are no others.
 // No method is generic: the code of a kind is compiled here, once, whoever plays it.
 pub trait Source {
-    /// A bundle over `memory`, at frame 0; an error where it is of no kind that is played here, or has too little memory.
-    fn start<'a>(bundle: &'a Bundle<'a>, memory: &'a mut [u8]) -> Result<Playing<'a>, MemoryError>;
+    /// Whether texels of `kind` are played.
+    fn known(kind: TexelKind) -> bool;
+
+    /// A bundle of such over enough `memory`, at no frame yet.
+    fn open<'a>(bundle: &'a Bundle<'a>, memory: &'a mut [u8]) -> Playing<'a>;
 
     /// Draws row `y`.
     fn row(playing: &mut Playing<'_>, y: u32, out: &mut [u16]);
@@ -60,11 +63,12 @@ trait Kind {
 macro_rules! sources {
     ($($kind:ty)*) => {$(
         impl Source for $kind {
-            fn start<'a>(bundle: &'a Bundle<'a>, memory: &'a mut [u8]) -> Result<Playing<'a>, MemoryError> {
+            fn known(kind: TexelKind) -> bool {
+                <$kind>::plays(kind)
+            }
+
+            fn open<'a>(bundle: &'a Bundle<'a>, memory: &'a mut [u8]) -> Playing<'a> {
                 let kind = bundle.texel_kind();
-                if !<$kind>::plays(kind) {
-                    return Err(MemoryError::Texels { needed: kind });
-                }
                 Playing::new(bundle, memory, |bits, scratch, picture| <$kind>::unpack(kind, bits, scratch, picture))
             }
 

@@ -105,7 +105,9 @@ fn rows(player: &mut Player<'_>, row: &mut [u16], clock: &mut Clock) -> Rows {
 fn play(bundle: &Bundle<'_>, memory: &mut [u8], row: &mut [u16], clock: &mut Clock) {
     let (width, height) = bundle.size();
     let Some(row) = row.get_mut(..width as usize) else { fail("a wide screen") };
-    let Ok(mut player) = Player::new(bundle, memory) else { fail("too little memory") };
+    // By reference: moved out of its result the player would be on the stack twice.
+    let mut made = Player::new(bundle, memory);
+    let Ok(player) = &mut made else { fail("too little memory") };
     for frame in 0..bundle.frames() {
         let seek = clock.measure(|| player.seek(Frame(frame)));
         // The clock counts a few million: that may be less than a frame.
@@ -122,7 +124,7 @@ fn play(bundle: &Bundle<'_>, memory: &mut [u8], row: &mut [u16], clock: &mut Clo
             .sum();
         let work = player.work();
         player.seek(Frame(frame));
-        let Rows { checksum, loading, fit } = rows(&mut player, row, clock);
+        let Rows { checksum, loading, fit } = rows(player, row, clock);
         report(frame, [seek, drawing, loading], &work, &fit, checksum);
     }
 }
@@ -168,10 +170,11 @@ fn main() -> ! {
     static mut ROW: [u16; WIDEST] = [0; WIDEST];
     let Some(peripherals) = Peripherals::take() else { fail("no peripherals") };
     let mut clock = Clock::start(peripherals.SYST);
-    let Ok(bundle) = Bundle::parse(&BUNDLE.0) else { fail("no bundle that this player knows") };
+    let parsed = Bundle::parse(&BUNDLE.0);
+    let Ok(bundle) = &parsed else { fail("no bundle that this player knows") };
     let needed = bundle.memory_needed();
     let Some(memory) = MEMORY.get_mut(..needed) else { fail("too little memory") };
-    play(&bundle, memory, ROW, &mut clock);
+    play(bundle, memory, ROW, &mut clock);
     end(needed);
     loop {
         // The painted stack is read from outside, then the emulator is told to quit.
