@@ -73,6 +73,9 @@ pub enum BakeError {
         /// What else helps: leaving options to the search that are given; empty where none is.
         held: String,
     },
+    /// The model has no flattening of its own.
+    #[error(transparent)]
+    Own(#[from] chart::NoIslands),
     /// The player refuses what was baked: a fault of the baker.
     #[error(transparent)]
     Verify(#[from] VerifyError),

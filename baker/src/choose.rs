@@ -17,16 +17,23 @@ const SMALL: u32 = 160;
 const FRAMES: u32 = 128;
 /// Frames compared with the truth.
 const COMPARED: u32 = 8;
+/// A model whose texture is in more islands than this is not tried with them: they would share labels, and rectangles as large as the image.
+const MOST: usize = 2048;
 /// The picture of half the size, in parts of the whole one: a little over a quarter, since outlines shrink less than areas.
 const PICTURE: f64 = 1.0 / 3.5;
 
-/// Tries the families on `scene`: those that can flatten it, the scene's own among them if it brings one.
+/// Tries the families on `scene`: those that can flatten it, the scene's own among them if it brings one or has a texture that does.
 ///
 /// # Errors
 /// [`BakeError`] where no family can bake the scene.
 pub fn charts(scene: &Scene, settings: &Settings, progress: Progress<'_>) -> Result<Choice, BakeError> {
-    let families: &[Family] =
-        if chart::brings_own(scene) { &[Family::Own, Family::Planes, Family::Sight] } else { &[Family::Planes, Family::Sight] };
+    let families: &[Family] = if chart::brings_own(scene) {
+        &[Family::Own, Family::Planes, Family::Sight]
+    } else if chart::Islands::new(scene).is_ok_and(|islands| islands.count <= MOST) {
+        &[Family::Planes, Family::Sight, Family::Own]
+    } else {
+        &[Family::Planes, Family::Sight]
+    };
     let (small, settings) = halved(scene, settings);
     let tracer = Tracer::new(&small);
     let hits = Hits::cast(&small, &tracer, &|_, _| {});

@@ -220,7 +220,7 @@ pub enum Charts {
     Planes,
     /// As the camera sees it: for curved bodies and land.
     Sight,
-    /// As the scene itself has it; planes, if it has none.
+    /// As the scene itself has it, or as its texture coordinates do; planes where there are none.
     Own,
 }
 

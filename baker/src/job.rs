@@ -219,6 +219,10 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
 /// How to cut the surface: as asked for, as the scene brings it, or as trials show.
 fn choice(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<Choice, BakeError> {
     match options.charts {
+        Some(choice) if choice.family == Family::Own && !chart::brings_own(scene) => {
+            chart::Islands::new(scene)?;
+            Ok(choice)
+        }
         Some(choice) => Ok(choice),
         None if chart::brings_own(scene) => Ok(Family::Own.into()),
         None => choose::charts(scene, &options.settings(scene.playback.width), progress),

@@ -16,6 +16,8 @@ use rayon::prelude::*;
 const BEYOND: usize = 8;
 /// How far beyond an edge, as a barycentric weight, a colour sample still is the face's.
 const EDGE: f64 = 1e-9;
+/// The cosine that faces without a projection are taken to be seen at.
+const OBLIQUE: f64 = 0.3;
 
 /// The image before its colours are reduced.
 pub(super) struct Filled {
@@ -111,7 +113,7 @@ impl Patch<'_> {
     /// World units a texel covers; 0 for a texture copied texel by texel.
     fn texel_size(&self) -> f64 {
         match self.charting.charts[self.chart].projection {
-            Projection::Plane(_) | Projection::Point(..) => self.place.texel(),
+            Projection::Plane(_) | Projection::Point(..) | Projection::Unwrapped(_) => self.place.texel(),
             Projection::Texture => 0.0,
         }
     }
@@ -171,6 +173,7 @@ impl Patch<'_> {
             Projection::Plane(axes) | Projection::Point(_, axes, _) => {
                 self.charting.faces.list[face as usize].normal.dot(axes[2]).abs().max(0.2)
             }
+            Projection::Unwrapped(_) => OBLIQUE,
             Projection::Texture => 1.0,
         };
         let reach = self.texel_size() * (3.0 + 3.0 * (1.0 / (cosine * cosine) - 1.0).sqrt());

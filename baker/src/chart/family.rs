@@ -18,7 +18,7 @@ pub enum Family {
     Planes,
     /// As the camera sees it, along lines of sight and from points: curved and rough surfaces move as on the screen. For bodies and land.
     Sight,
-    /// As the scene itself has it flattened.
+    /// As the scene itself has it flattened, or its texture.
     #[default]
     Own,
 }

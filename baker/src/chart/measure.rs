@@ -92,7 +92,7 @@ pub(super) fn measure(scene: &Scene, hits: &Hits, charting: &mut Charting, densi
                     let unit = match chart.projection {
                         // Flattened lengths shrink with the distance from the view's eye.
                         Projection::Point(eye, [_, _, back], near) => ((eye - face.point(s)).dot(back) / near).max(1e-3),
-                        _ => 1.0,
+                        _ => charting.stretch(id),
                     };
                     figures.densities[bin(unit * lens.focal * (slant / (z * z * z)).sqrt())] += 1;
                     figures.hits += 1;
@@ -126,6 +126,10 @@ fn settle(chart: &mut Chart, figures: &Figures, turns: &[[f64; 2]; TURNS], densi
         let [x, y] = turns[best];
         let [u, v, n] = *axes;
         *axes = [u * x + v * y, v * x - u * y, n];
+    }
+    if let Projection::Unwrapped(map) = &mut chart.projection {
+        let ([x, y], [u, v]) = (turns[best], *map);
+        *map = [[0, 1].map(|k| u[k] * x + v[k] * y), [0, 1].map(|k| v[k] * x - u[k] * y)];
     }
     chart.hits = figures.hits;
     let (k, l) = (best, best + TURNS / 2);

@@ -14,6 +14,7 @@ mod observe;
 mod price;
 mod refine;
 mod sight;
+mod unwrapped;
 mod view;
 
 use crate::gbuffer::Hits;
@@ -24,9 +25,14 @@ use view::View;
 pub use family::{Choice, Family, Trial, reason};
 pub use labels::assign;
 pub(crate) use observe::Faces;
+pub(crate) use unwrapped::Islands;
+pub use unwrapped::NoIslands;
 
 /// Not a face, not a chart.
 pub(crate) const NONE: u32 = u32::MAX;
+
+/// What takes the place of depth where there is no projection: two surfaces that lie on each other in a texture are seldom level in it.
+const OBLIQUE: DVec3 = DVec3::new(0.48, 0.64, 0.6);
 
 /// How a chart is flattened.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +43,8 @@ pub enum Projection {
     Point(DVec3, [DVec3; 3], f64),
     /// The scene's own texture coordinates; texels of the texture.
     Texture,
+    /// The model's texture coordinates, times this matrix (rows); about world units.
+    Unwrapped([[f64; 2]; 2]),
 }
 
 /// A region of the source image on which the map from the surface is continuous.
@@ -101,6 +109,14 @@ impl Charting {
         sums.into_iter().map(|[depth, hits]| (depth / f64::max(hits, 1.0)).max(f64::MIN_POSITIVE)).collect()
     }
 
+    /// World units that a flattened unit covers on face `face`, as the side of a square; 1 where the projection tells.
+    pub(crate) fn stretch(&self, face: usize) -> f64 {
+        let Projection::Unwrapped(_) = self.charts[self.chart_of[face] as usize].projection else { return 1.0 };
+        let ([p, q, r], [a, b, c]) = (self.corners[face], self.faces.list[face].position);
+        let flat = ((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])).abs();
+        ((b - a).cross(c - a).length() / flat.max(f64::MIN_POSITIVE)).sqrt()
+    }
+
     /// Computes the faces' flattened corners from the charts' projections.
     fn flatten(&mut self, scene: &Scene) {
         self.corners = self
@@ -119,6 +135,13 @@ impl Charting {
                     let size = islands::texture_size(scene, t.material);
                     t.uv.map(|uv| [f64::from(uv.x) * size[0], f64::from(uv.y) * size[1], 0.0, 1.0])
                 }
+                Projection::Unwrapped(map) => {
+                    let t = &scene.triangles[(face.surface / 2) as usize];
+                    [0, 1, 2].map(|k| {
+                        let [x, y] = map.map(|row| row[0] * f64::from(t.uv[k].x) + row[1] * f64::from(t.uv[k].y));
+                        [x, y, OBLIQUE.dot(face.position[k]), 1.0]
+                    })
+                }
             })
             .collect();
     }
@@ -131,7 +154,8 @@ pub fn brings_own(scene: &Scene) -> bool {
 }
 
 /// Cuts what is seen into charts with at most `density` texels a pixel, for a source image of sides up to `max_side`. The scene's own flattening
-/// is kept at `density` of its texels, at most all; `Family::Own` is `Family::Planes` for a scene without.
+/// is kept at `density` of its texels, at most all. `Family::Own` is the model's texture for a scene without, and `Family::Planes` where that does
+/// not flatten it.
 pub fn build(scene: &Scene, hits: &Hits, family: Family, density: f64, max_side: u32) -> Charting {
     let own = family == Family::Own && brings_own(scene);
     let (faces, links) = observe::observe(scene, hits, !own);
@@ -141,9 +165,11 @@ pub fn build(scene: &Scene, hits: &Hits, family: Family, density: f64, max_side:
         charting.charts.iter_mut().for_each(|chart| chart.density *= density.min(1.0));
         return charting;
     }
+    let islands = if family == Family::Own { Islands::new(scene).ok() } else { None };
+    let cut = !islands.as_ref().is_some_and(|islands| islands.hold(&faces));
     let mut candidates: Vec<merge::Clusters> = Vec::new();
-    let merging = merge::Merging::new(scene, &faces, &links, family);
-    for &weights in family.weights() {
+    let merging = cut.then(|| merge::Merging::new(scene, &faces, &links, family));
+    for (merging, &weights) in merging.iter().flat_map(|merging| family.weights().iter().map(move |weights| (merging, weights))) {
         let mut clusters = merging.merge(weights);
         absorb::absorb(&faces, &links, &mut clusters, hits.samples.len());
         if candidates.iter().all(|c| c.of != clusters.of) {
@@ -165,6 +191,10 @@ pub fn build(scene: &Scene, hits: &Hits, family: Family, density: f64, max_side:
     }
     if let Some((_, chart_of, charts)) = best {
         (charting.chart_of, charting.charts) = (chart_of, charts);
+    }
+    if let Some(islands) = islands {
+        islands.take(scene, &mut charting);
+        measure::measure(scene, hits, &mut charting, density, max_side);
     }
     charting.flatten(scene);
     if fold::split(hits, &mut charting, &links) {
