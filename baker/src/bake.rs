@@ -253,8 +253,9 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let fields = polish::polish(fields, gbuffer, &grid, &sheets, &layers);
     progress("coding keys", 0.8);
     let choice = settings.atlas.charts;
-    let reason = || chart::reason(choice.family, choice.tried());
-    let info = if choice.tried().next().is_some() { format!("{}; {}", scene.name, reason()) } else { scene.name.clone() };
+    let reason = || chart::reason(choice.family, choice.rewarped, choice.tried());
+    let info =
+        if choice.rewarped || choice.tried().next().is_some() { format!("{}; {}", scene.name, reason()) } else { scene.name.clone() };
     let header = encode::Header { storage: settings.atlas.storage, fps: scene.playback.fps, info: &info };
     let (planes, cameras) = planes::records(&charts, &layers.by_label(image.labels.len()), &lenses, &grid);
     let content =

@@ -11,6 +11,8 @@ use rayon::prelude::*;
 const SHARE: f64 = 0.9;
 /// Directions tried over half a turn for the chart's smallest rectangle.
 const TURNS: usize = 32;
+/// Charts in all tables together, at most, while there are two tables: 3 kB each.
+const TABLES: usize = 100_000;
 /// Histogram bins: 8 an octave of single-precision numbers from 2^-40 to 2^40.
 const BINS: usize = 640;
 const FIRST_BIN: u32 = (127 - 40) << 3;
@@ -71,8 +73,9 @@ pub(super) fn measure(scene: &Scene, hits: &Hits, charting: &mut Charting, densi
         [libm::cos(angle), libm::sin(angle)]
     });
     let frame_size = (hits.width * hits.height) as usize;
-    // Fixed chunks: as many as keep two dozen threads busy, few enough to hold a table of charts each.
-    let chunk = (hits.frames as usize).div_ceil(24).max(1) * frame_size;
+    // As many chunks as keep two dozen threads busy, few enough to hold a table of charts each. Whatever they are, the sums are the same.
+    let chunks = (TABLES / charting.charts.len().max(1)).clamp(2, 24);
+    let chunk = (hits.frames as usize).div_ceil(chunks).max(1) * frame_size;
     let tables: Vec<Vec<Option<Box<Figures>>>> = hits
         .samples
         .par_chunks(chunk.max(1))

@@ -16,6 +16,7 @@ mod refine;
 mod sight;
 mod unwrapped;
 mod view;
+mod warp;
 
 use crate::gbuffer::Hits;
 use crate::scene::Scene;
@@ -27,6 +28,7 @@ pub use labels::assign;
 pub(crate) use observe::Faces;
 pub(crate) use unwrapped::Islands;
 pub use unwrapped::NoIslands;
+pub(crate) use warp::rewarp;
 
 /// Not a face, not a chart.
 pub(crate) const NONE: u32 = u32::MAX;
@@ -72,19 +74,24 @@ pub struct Charting {
     pub(crate) corners: Vec<[[f64; 4]; 3]>,
     /// The charts.
     pub charts: Vec<Chart>,
+    /// How each chart is warped; empty where none is.
+    pub(crate) warps: Vec<Option<warp::Warp>>,
 }
 
 impl Charting {
-    /// Flattened coordinates and depth of face `face` at barycentric `[b, c]`.
+    /// Flattened coordinates, warped where the chart is, and depth of face `face` at barycentric `[b, c]`.
     #[inline]
     pub(crate) fn flat(&self, face: usize, b: f64, c: f64) -> [f64; 3] {
         let [p, q, r] = &self.corners[face];
         let a = 1.0 - b - c;
         let [x, y, depth, w] = [0, 1, 2, 3].map(|k| a * p[k] + b * q[k] + c * r[k]);
-        [x / w, y / w, depth]
+        match self.warps.get(self.chart_of[face] as usize) {
+            Some(Some(warp)) => [warp[0].of(x / w), warp[1].of(y / w), depth],
+            _ => [x / w, y / w, depth],
+        }
     }
 
-    /// Flattened coordinates and depth of the corners of face `face`.
+    /// Flattened coordinates, not warped, and depth of the corners of face `face`.
     pub(crate) fn outline(&self, face: usize) -> [[f64; 3]; 3] {
         self.corners[face].map(|[x, y, depth, w]| [x / w, y / w, depth])
     }
@@ -176,7 +183,7 @@ pub fn build(scene: &Scene, hits: &Hits, family: Family, density: f64, max_side:
             candidates.push(clusters);
         }
     }
-    let mut charting = Charting { charts: Vec::new(), chart_of: Vec::new(), corners: Vec::new(), faces };
+    let mut charting = Charting { charts: Vec::new(), chart_of: Vec::new(), corners: Vec::new(), warps: Vec::new(), faces };
     let mut best: Option<(f64, Vec<u32>, Vec<Chart>)> = None;
     for clusters in candidates {
         let chart =
