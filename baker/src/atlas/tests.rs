@@ -1,7 +1,7 @@
 //! Tests of the way from hits to the source image, on small scenes made here.
 
 use super::*;
-use crate::camera::{Path, Pose};
+use crate::camera::{Aim, Line, Path, Pose};
 use crate::gbuffer::Sample;
 use crate::scene::{Light, Material, Playback, Texture, Triangle, Wrap};
 use crate::trace::Tracer;
@@ -102,8 +102,29 @@ fn hits(scene: &Scene) -> Hits {
     Hits::cast(scene, &Tracer::new(scene), &|_, _| {})
 }
 
-fn made_as(scene: &Scene, hits: &Hits, family: Family) -> Atlas {
-    build(scene, hits, &Settings { charts: family.into(), ..Settings::default() }, &|_, _| {}).expect("an atlas")
+fn made_as(scene: &Scene, hits: &Hits, charts: impl Into<Choice>) -> Atlas {
+    build(scene, hits, &Settings { charts: charts.into(), ..Settings::default() }, &|_, _| {}).expect("an atlas")
+}
+
+fn rewarped(family: Family) -> Choice {
+    Choice { rewarped: true, ..family.into() }
+}
+
+/// A rolling plain from under the camera to far away, and the camera low above it.
+fn plain() -> Scene {
+    let point = |i: i32, j: i32| {
+        let (x, z) = (f64::from(i - 20), f64::from(3 - j));
+        DVec3::new(x, 0.3 * libm::sin(0.7 * x) * libm::cos(0.5 * z), z)
+    };
+    let mut triangles: Vec<Triangle> = (0..40)
+        .flat_map(|i| (0..40).flat_map(move |j| quad([point(i, j), point(i + 1, j), point(i + 1, j + 1), point(i, j + 1)])))
+        .collect();
+    triangles.iter_mut().for_each(|t| t.uv = t.position.map(|p| Vec2::new(p.x as f32, p.z as f32) / 8.0));
+    let mut scene = scene(triangles, vec![texture(64, |_, _| false)], Material { texture: Some(0), ..Default::default() });
+    let at = |x: f64| DVec3::new(x, 2.0, 3.0);
+    scene.camera =
+        Arc::new(Line { from: at(-1.0), to: at(1.0), aim: Aim::Direction(DVec3::new(0.0, -0.35, -1.0)), up: DVec3::Y, fov: 50.0 });
+    scene
 }
 
 fn made(scene: &Scene, hits: &Hits) -> Atlas {
@@ -160,9 +181,18 @@ fn psnr(scene: &Scene, hits: &Hits, atlas: &Atlas) -> f64 {
 
 #[test]
 fn the_source_image_shows_what_shading_shows() {
-    for (name, scene, bound) in [("cube", cube(), 33.0), ("hill", hill(), 33.0), ("crossing", crossing(), 31.0)] {
+    let (planes, moved) = (Choice::from(Family::Planes), rewarped(Family::Planes));
+    let all = [
+        ("cube", cube(), planes, 33.0),
+        ("hill", hill(), planes, 33.0),
+        ("crossing", crossing(), planes, 31.0),
+        ("cube rewarped", cube(), moved, 33.0),
+        ("hill rewarped", hill(), moved, 33.0),
+        ("crossing rewarped", crossing(), moved, 31.0),
+    ];
+    for (name, scene, charts, bound) in all {
         let hits = hits(&scene);
-        let atlas = made(&scene, &hits);
+        let atlas = made_as(&scene, &hits, charts);
         let psnr = psnr(&scene, &hits, &atlas);
         println!("{name}: {psnr:.1} dB, {:?}", atlas.figures);
         assert!(psnr > bound, "{name}: {psnr} dB, expected more than {bound}");
@@ -171,12 +201,15 @@ fn the_source_image_shows_what_shading_shows() {
 
 #[test]
 fn coordinates_stay_in_covered_texels_of_their_label() {
-    for scene in [cube(), hill(), crossing()] {
+    for (scene, charts) in
+        [cube(), hill(), crossing(), plain()].into_iter().flat_map(|s| [(s.clone(), Family::Planes.into()), (s, rewarped(Family::Planes))])
+    {
         let hits = hits(&scene);
-        let Atlas { image, .. } = &made(&scene, &hits);
+        let atlas = made_as(&scene, &hits, charts);
+        let Atlas { image, .. } = &atlas;
         assert!(image.width.is_power_of_two() && image.height.is_multiple_of(4));
         assert!(image.palette.iter().all(|&c| palette::widened(c) == c));
-        for (s, label, uv) in seen(&hits, &made(&scene, &hits)) {
+        for (s, label, uv) in seen(&hits, &atlas) {
             let [x0, y0, x1, y1] = image.labels[usize::from(label)].rect.map(f32::from);
             assert_eq!(label == 0, s.surface == BACKGROUND);
             assert!(uv[0] >= x0 && uv[0] < x1 && uv[1] >= y0 && uv[1] < y1, "{uv:?} outside {:?}", [x0, y0, x1, y1]);
@@ -228,9 +261,12 @@ fn planes_are_charts_of_their_own_and_a_smooth_hill_is_one() {
 
 #[test]
 fn texels_lie_in_their_own_charts_footprint() {
-    for scene in [cube(), hill(), crossing()] {
+    for (scene, moved) in [cube(), hill(), crossing()].into_iter().flat_map(|s| [(s.clone(), false), (s, true)]) {
         let hits = hits(&scene);
-        let charting = chart::build(&scene, &hits, Family::Planes, 1.0, 512);
+        let mut charting = chart::build(&scene, &hits, Family::Planes, 1.0, 512);
+        if moved {
+            chart::rewarp(&hits, &mut charting);
+        }
         let footprints = footprint::Footprints::new(&scene, &hits, &charting);
         for side in [64, 512] {
             let layout = pack::pack(&footprints, [4, 4], side).expect("a layout");
@@ -364,6 +400,27 @@ fn a_texture_that_does_not_flatten_is_said_to() {
     hill.triangles[1600].uv = [Vec2::ONE; 3];
     assert_eq!(Islands::new(&hill).map(|i| i.count).ok(), Some(1));
     assert_eq!(made_as(&hill, &hits(&hill), Family::Own).figures.charts, 2);
+}
+
+#[test]
+fn texels_move_to_where_detail_is_seen() {
+    let scene = plain();
+    let hits = hits(&scene);
+    let of = |charts: Choice| {
+        let atlas = made_as(&scene, &hits, charts);
+        // Texels a pixel, down the screen: of the lowest rows, and of those a third above.
+        let step = |rows: std::ops::Range<usize>| {
+            let uv = &atlas.gbuffer.uv;
+            let steps = rows
+                .flat_map(|y| (0..120).map(move |x| y * 120 + x))
+                .filter(|&i| atlas.gbuffer.label[i] > 0 && atlas.gbuffer.label[i] == atlas.gbuffer.label[i + 120]);
+            let steps: Vec<f64> = steps.map(|i| f64::from((uv[i][0] - uv[i + 120][0]).hypot(uv[i][1] - uv[i + 120][1]))).collect();
+            steps.iter().sum::<f64>() / steps.len() as f64
+        };
+        (psnr(&scene, &hits, &atlas), atlas.image.covered.iter().filter(|&&c| c).count(), step(75..89) / step(45..55))
+    };
+    let (plain, moved) = (of(Family::Planes.into()), of(rewarped(Family::Planes)));
+    assert!(moved.0 > 28.0 && moved.1 < plain.1 && moved.2 > 1.2 * plain.2, "{plain:?} {moved:?}");
 }
 
 #[test]
