@@ -74,11 +74,9 @@ impl Islands {
             return Err(NoIslands::None { triangles: found });
         }
         let without: f64 = triangles.iter().zip(&usable).filter(|(_, usable)| !**usable).map(|(t, _)| area(t)).sum();
-        if let Some(first) = usable.iter().position(|&usable| !usable) {
-            if without > WITHOUT * triangles.iter().map(area).sum::<f64>() {
-                let material = triangles[first].material;
-                return Err(NoIslands::Area { found, triangles: triangles.len(), first, material });
-            }
+        let all: f64 = triangles.iter().map(area).sum();
+        if let Some(first) = usable.iter().position(|&usable| !usable).filter(|_| without > WITHOUT * all) {
+            return Err(NoIslands::Area { found, triangles: triangles.len(), first, material: triangles[first].material });
         }
         let mut parent: Vec<u32> = (0..triangles.len() as u32).collect();
         for sharing in edges(triangles, &usable).chunk_by(|a, b| a.ends == b.ends) {

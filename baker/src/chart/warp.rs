@@ -96,9 +96,9 @@ pub(crate) fn rewarp(hits: &Hits, charting: &mut Charting) {
         let range = &mut depth[c as usize];
         *range = corners.iter().fold(*range, |r, corner| (r.0.min(corner[2]), r.1.max(corner[2])));
     }
-    let of = |((chart, demand), (low, high)): ((&mut Chart, &Option<Box<Demand>>), (f64, f64))| {
+    let of = |chart: &mut Chart, demand: Option<&Demand>, (low, high): (f64, f64)| {
         let copied = matches!(chart.projection, Projection::Texture);
-        let demand = demand.as_ref().filter(|_| !copied && (0..2).all(|k| chart.hi[k] - chart.lo[k] > 0.0))?;
+        let demand = demand.filter(|_| !copied && (0..2).all(|k| chart.hi[k] - chart.lo[k] > 0.0))?;
         let flat = (high - low) * chart.density < FLAT;
         let mut slopes = [0, 1].map(|k| slopes(&demand[k], flat));
         let mean = |s: &[f64; PIECES + 1]| (1..=PIECES).map(|i| 0.5 * (s[i - 1] + s[i])).sum::<f64>() / PIECES as f64;
@@ -110,7 +110,8 @@ pub(crate) fn rewarp(hits: &Hits, charting: &mut Charting) {
         }
         Some(warp)
     };
-    charting.warps = charting.charts.iter_mut().zip(&demands).zip(depth).map(of).collect();
+    charting.warps =
+        charting.charts.iter_mut().zip(&demands).zip(depth).map(|((c, demand), depth)| of(c, demand.as_deref(), depth)).collect();
 }
 
 /// The slopes at the knots of a direction: how many times as dense as the chart each piece has to be.
