@@ -74,6 +74,9 @@ pub enum BakeError {
         /// What else helps: leaving options to the search that are given; empty where none is.
         held: String,
     },
+    /// The model has no flattening of its own.
+    #[error(transparent)]
+    Own(#[from] chart::NoIslands),
     /// The player refuses what was baked: a fault of the baker.
     #[error(transparent)]
     Verify(#[from] VerifyError),
@@ -263,8 +266,9 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let fields = polish::polish(fields, gbuffer, &grid, &sheets, &layers);
     progress("coding keys", 0.8);
     let choice = settings.atlas.charts;
-    let reason = || chart::reason(choice.family, choice.tried());
-    let info = if choice.tried().next().is_some() { format!("{}; {}", scene.name, reason()) } else { scene.name.clone() };
+    let reason = || chart::reason(choice.family, choice.rewarped, choice.tried());
+    let info =
+        if choice.rewarped || choice.tried().next().is_some() { format!("{}; {}", scene.name, reason()) } else { scene.name.clone() };
     let header = encode::Header { storage: settings.atlas.storage, fps: scene.playback.fps, info: &info };
     let (planes, cameras) = planes::records(&charts, &layers.by_label(image.labels.len()), &lenses, &grid);
     let content =

@@ -17,16 +17,26 @@ const SMALL: u32 = 160;
 const FRAMES: u32 = 128;
 /// Frames compared with the truth.
 const COMPARED: u32 = 8;
+/// A model whose texture is in more islands than this is not tried with them: they would share labels, and rectangles as large as the image.
+const MOST: usize = 2048;
+/// What moving texels has to gain to be done, dB: less may come of anything.
+const GAIN: f64 = 0.1;
 /// The picture of half the size, in parts of the whole one: a little over a quarter, since outlines shrink less than areas.
 const PICTURE: f64 = 1.0 / 3.5;
 
-/// Tries the families on `scene`: those that can flatten it, the scene's own among them if it brings one.
+/// Tries the families on `scene`: those that can flatten it, the scene's own among them if it brings one or has a texture that does. Then the best of
+/// them with texels moved inside charts, unless `rewarp` says whether they are.
 ///
 /// # Errors
 /// [`BakeError`] where no family can bake the scene.
-pub fn charts(scene: &Scene, settings: &Settings, progress: Progress<'_>) -> Result<Choice, BakeError> {
-    let families: &[Family] =
-        if chart::brings_own(scene) { &[Family::Own, Family::Planes, Family::Sight] } else { &[Family::Planes, Family::Sight] };
+pub fn charts(scene: &Scene, settings: &Settings, rewarp: Option<bool>, progress: Progress<'_>) -> Result<Choice, BakeError> {
+    let families: &[Family] = if chart::brings_own(scene) {
+        &[Family::Own, Family::Planes, Family::Sight]
+    } else if chart::Islands::new(scene).is_ok_and(|islands| islands.count <= MOST) {
+        &[Family::Planes, Family::Sight, Family::Own]
+    } else {
+        &[Family::Planes, Family::Sight]
+    };
     let (small, settings) = halved(scene, settings);
     let tracer = Tracer::new(&small);
     let hits = Hits::cast(&small, &tracer, &|_, _| {});
@@ -34,25 +44,38 @@ pub fn charts(scene: &Scene, settings: &Settings, progress: Progress<'_>) -> Res
     let frames = spread(small.playback.frames, COMPARED);
     let mut refused = None;
     let mut choice = Choice::from(Family::Planes);
-    for ((at, &family), trial) in families.iter().enumerate().zip(&mut choice.trials) {
-        progress("trying charts", at as f64 / families.len() as f64);
-        let settings = Settings { atlas: atlas::Settings { charts: family.into(), ..settings.atlas }, ..settings };
+    let last = choice.trials.len() - 1;
+    let mut tried = |family: Family, rewarped: bool| -> Option<Trial> {
+        let charts = Choice { rewarped, ..family.into() };
+        let settings = Settings { atlas: atlas::Settings { charts, ..settings.atlas }, ..settings };
         let flat = bake::flatten_hits(&small, (&tracer, &hits, 0.0), &settings.atlas, &|_, _| {});
         match flat.and_then(|flat| attempt(&small, &flat, &settings, (&truth, &frames))) {
             Ok((keys, picture, psnr)) => {
                 let keys = keys * f64::from(scene.playback.frames) / f64::from(small.playback.frames.max(1));
                 let scale = if small.playback.width < scene.playback.width { PICTURE } else { 1.0 };
-                *trial = Some(Trial { family, bytes: (keys + picture / scale) as u64, psnr });
+                Some(Trial { family, rewarped, bytes: (keys + picture / scale) as u64, psnr })
             }
-            Err(error) => refused = refused.or(Some(error)),
+            Err(error) => {
+                refused = refused.take().or(Some(error));
+                None
+            }
         }
+    };
+    for (at, &family) in families.iter().enumerate() {
+        progress("trying charts", at as f64 / (families.len() + 1) as f64);
+        choice.trials[at] = tried(family, rewarp.unwrap_or(false));
+    }
+    // Of equals the first.
+    let mut best = choice.tried().copied().reduce(|best, t| if t.worth() > best.worth() { t } else { best });
+    if let (Some(plain), None) = (best, rewarp) {
+        progress("trying charts", families.len() as f64 / (families.len() + 1) as f64);
+        choice.trials[last] = tried(plain.family, true);
+        best = choice.trials[last].filter(|t| t.worth() > plain.worth() + GAIN).or(best);
     }
     progress("trying charts", 1.0);
-    // Of equals the first.
-    let best = choice.tried().reduce(|best, t| if t.worth() > best.worth() { t } else { best }).map(|t| t.family);
     match (best, refused) {
         (None, Some(error)) => Err(error),
-        (best, _) => Ok(Choice { family: best.unwrap_or(choice.family), ..choice }),
+        (best, _) => Ok(best.map_or(choice, |best| Choice { family: best.family, rewarped: best.rewarped, ..choice })),
     }
 }
 
@@ -86,7 +109,7 @@ mod tests {
     fn every_family_is_tried_on_a_scene_with_islands() {
         let mut scene = builtin::build("pyramid").expect("there is one");
         (scene.playback.width, scene.playback.height, scene.playback.frames) = (96, 64, 9);
-        let choice = charts(&scene, &Settings::default(), &|_, _| {}).expect("it bakes");
+        let choice = charts(&scene, &Settings::default(), Some(false), &|_, _| {}).expect("it bakes");
         let tried: Vec<Family> = choice.tried().map(|t| t.family).collect();
         assert_eq!(tried, [Family::Own, Family::Planes, Family::Sight]);
         assert!(choice.tried().all(|t| t.bytes > 100 && t.psnr > 20.0), "{choice:?}");

@@ -118,6 +118,11 @@ pub struct Bake {
     /// flattening of its own, as built-in ones do, keeps it.
     #[arg(long, value_enum, value_name = "KIND", default_value_t = Charts::Auto)]
     pub charts: Charts,
+    /// Whether texels move inside charts to where their detail is seen [default: auto].
+    ///
+    /// Land that reaches from the camera to the horizon is then finer near than far. Auto tries it where --charts tries, after the best of those.
+    #[arg(long, value_enum, value_name = "KIND", default_value_t = Rewarp::Auto)]
+    pub rewarp: Rewarp,
     /// What a bit of the keys is worth, 0 to 100 [default: auto]: more takes fewer bytes at less quality.
     ///
     /// Auto takes 0.01, 0.05, 0.2 or 1, the coarsest that pays: halving the keys' bytes may cost 1.5 dB. Rough land is as good at 1; a flat
@@ -221,8 +226,19 @@ pub enum Charts {
     Planes,
     /// As the camera sees it: for curved bodies and land.
     Sight,
-    /// As the scene itself has it; planes, if it has none.
+    /// As the scene itself has it, or as its texture coordinates do; planes where there are none.
     Own,
+}
+
+/// Whether texels move inside charts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Rewarp {
+    /// Where that costs least.
+    Auto,
+    /// Not at all.
+    Off,
+    /// In every chart but those whose texels are the scene's own.
+    On,
 }
 
 /// What replaces the scene's playback.
@@ -323,6 +339,11 @@ impl Bake {
             },
             storage: self.storage.map(storage),
             charts: charts.map(Into::into),
+            rewarp: match self.rewarp {
+                Rewarp::Auto => None,
+                Rewarp::Off => Some(false),
+                Rewarp::On => Some(true),
+            },
             lambda: self.lambda.map(|lambda| lambda as f32),
             independent_every: self.independent_every.into(),
             goal,

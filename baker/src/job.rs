@@ -60,6 +60,8 @@ pub struct Options {
     pub storage: Option<Storage>,
     /// How the surface is cut and flattened, in place of `source.charts`; `None`: the baker tries.
     pub charts: Option<Choice>,
+    /// Whether texels move inside charts to where their detail is seen; `None`: the baker tries, where it tries charts.
+    pub rewarp: Option<bool>,
     /// What a bit of the keys is worth, as [`Settings::coding`] has it; `None`: as much as hardly shows.
     pub lambda: Option<f32>,
     /// Every this many keys one that needs no earlier one.
@@ -83,6 +85,7 @@ impl Default for Options {
             source: atlas::Settings::default(),
             storage: None,
             charts: None,
+            rewarp: None,
             lambda: None,
             independent_every: Settings::default().coding.independent_every,
             goal: Goal::AsSet,
@@ -222,10 +225,16 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
 
 /// How to cut the surface: as asked for, as the scene brings it, or as trials show.
 fn choice(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<Choice, BakeError> {
+    let rewarped = options.rewarp.unwrap_or(false);
     match options.charts {
-        Some(choice) => Ok(choice),
-        None if chart::brings_own(scene) => Ok(Family::Own.into()),
-        None => choose::charts(scene, &options.settings(scene.playback.width), progress),
+        Some(choice) => {
+            if choice.family == Family::Own && !chart::brings_own(scene) {
+                chart::Islands::new(scene)?;
+            }
+            Ok(Choice { rewarped: options.rewarp.unwrap_or(choice.rewarped), ..choice })
+        }
+        None if chart::brings_own(scene) => Ok(Choice { rewarped, ..Family::Own.into() }),
+        None => choose::charts(scene, &options.settings(scene.playback.width), options.rewarp, progress),
     }
 }
 

@@ -97,6 +97,9 @@ pub struct Source {
     pub raw_bytes: usize,
     /// How the surface was cut and flattened.
     pub candidate: Family,
+    /// Whether texels were moved inside charts to where their detail is seen.
+    #[serde(default)]
+    pub rewarped: bool,
     /// What was tried before, and what came of it; empty where nothing was.
     pub trials: Vec<Trial>,
     /// Connected regions.
@@ -197,6 +200,7 @@ impl Report {
                 stored_bytes: inspection.image.stored_bytes,
                 raw_bytes: inspection.image.raw_bytes,
                 candidate: settings.atlas.charts.family,
+                rewarped: settings.atlas.charts.rewarped,
                 trials: settings.atlas.charts.tried().copied().collect(),
                 charts: figures.charts,
                 labels: figures.labels,
@@ -333,7 +337,7 @@ pub fn table(report: &Report) -> Vec<(String, String)> {
         ),
     );
     row("labels, mask", format!("{} bytes: {} labels for {} charts", grouped(bytes.labels + bytes.mask), image.labels, image.charts));
-    row("", chart::reason(image.candidate, image.trials.iter()));
+    row("", chart::reason(image.candidate, image.rewarped, image.trials.iter()));
     row("keys", format!("{} bytes: {:.1} a frame", grouped(bytes.keys), bytes.keys_per_frame));
     row("bundle", format!("{} bytes: {:.1} a frame", grouped(bytes.bundle), bytes.per_frame));
     row(

@@ -2,7 +2,8 @@
 //! Places come from the packing, colours from [`Shader`]; the coloured image goes to the palette.
 
 use super::Seen;
-use super::footprint::{each_sample, fine, members};
+use super::footprint::{fine, members};
+use super::grid::Grid;
 use super::pack::Layout;
 use super::place::Place;
 use crate::chart::{Charting, NONE, Projection};
@@ -16,6 +17,8 @@ use rayon::prelude::*;
 const BEYOND: usize = 8;
 /// How far beyond an edge, as a barycentric weight, a colour sample still is the face's.
 const EDGE: f64 = 1e-9;
+/// The cosine that faces without a projection are taken to be seen at.
+const OBLIQUE: f64 = 0.3;
 
 /// The image before its colours are reduced.
 pub(super) struct Filled {
@@ -108,10 +111,10 @@ struct Patch<'a> {
 }
 
 impl Patch<'_> {
-    /// World units a texel covers; 0 for a texture copied texel by texel.
-    fn texel_size(&self) -> f64 {
+    /// World units a texel covers around a colour sample; 0 for a texture copied texel by texel.
+    fn texel_size(&self, grid: &Grid, column: u32, row: u32) -> f64 {
         match self.charting.charts[self.chart].projection {
-            Projection::Plane(_) | Projection::Point(..) => self.place.texel(),
+            Projection::Plane(_) | Projection::Point(..) | Projection::Unwrapped(_) => grid.texel([column as usize, row as usize]),
             Projection::Texture => 0.0,
         }
     }
@@ -137,12 +140,13 @@ impl Patch<'_> {
         let references: Vec<_> = (0..height).flat_map(|y| (0..width).map(move |x| self.first(x, y))).collect();
         let fine = self.fine();
         let mut spots = vec![Spot { face: NONE, bary: [0.0; 2], depth: f64::NEG_INFINITY }; (width * height * fine * fine) as usize];
+        let grid = Grid::new(self.charting, self.chart, self.place, fine);
         for &face in faces {
-            self.draw(face, width, &references, &mut spots);
+            self.draw(&grid, face, width, &references, &mut spots);
         }
-        let size = self.texel_size();
         let finish = |(i, reference): (usize, &Option<Reference>)| {
             let (x, y) = (i as u32 % width * fine, i as u32 / width * fine);
+            let size = self.texel_size(&grid, x, y);
             let (mut sum, mut count) = (Vec3::ZERO, 0.0);
             for j in 0..fine {
                 for k in 0..fine {
@@ -163,22 +167,18 @@ impl Patch<'_> {
     }
 
     /// Lays one face over the samples it is in front of.
-    fn draw(&self, face: u32, width: u32, references: &[Option<Reference>], spots: &mut [Spot]) {
-        let Place { rect, .. } = self.place;
+    fn draw(&self, grid: &Grid, face: u32, width: u32, references: &[Option<Reference>], spots: &mut [Spot]) {
         let fine = self.fine();
         let surface = self.charting.faces.list[face as usize].surface;
         let cosine = match self.charting.charts[self.chart].projection {
             Projection::Plane(axes) | Projection::Point(_, axes, _) => {
                 self.charting.faces.list[face as usize].normal.dot(axes[2]).abs().max(0.2)
             }
+            Projection::Unwrapped(_) => OBLIQUE,
             Projection::Texture => 1.0,
         };
-        let reach = self.texel_size() * (3.0 + 3.0 * (1.0 / (cosine * cosine) - 1.0).sqrt());
-        let corners = self.charting.outline(face as usize).map(|c| {
-            let at = self.place.at(c);
-            [0, 1].map(|k| (at[k] - f64::from(rect[k])) * f64::from(fine))
-        });
-        each_sample(corners, [0, 1].map(|k| (rect[k + 2] - rect[k]) * fine), EDGE, |i, j, shares| {
+        let reach = 3.0 + 3.0 * (1.0 / (cosine * cosine) - 1.0).sqrt();
+        grid.each_sample(self.charting, face as usize, EDGE, |i, j, shares| {
             let [b, c] = self.charting.weights(face as usize, shares);
             if is_hole(self.scene, surface / 2, [b, c]) {
                 return;
@@ -188,7 +188,9 @@ impl Patch<'_> {
             // ray casting.
             let seen = references[(j / fine * width + i / fine) as usize].as_ref();
             let spot = &mut spots[(j * width * fine + i) as usize];
-            if seen.is_none_or(|r| (depth - r.depth).abs() <= reach) && depth > spot.depth + 1e-9 * depth.abs() {
+            if seen.is_none_or(|r| (depth - r.depth).abs() <= reach * self.texel_size(grid, i, j))
+                && depth > spot.depth + 1e-9 * depth.abs()
+            {
                 *spot = Spot { face, bary: [b, c], depth };
             }
         });

@@ -1,6 +1,7 @@
 //! Footprints: the texels that each chart shows something in, at a given scale. No two charts may share one.
 //! Charts and samples come from the charting and the G-buffer; the masks go to the packing.
 
+use super::grid::Grid;
 use super::mask::Mask;
 use super::place::Place;
 use crate::chart::{Charting, Projection};
@@ -37,31 +38,6 @@ pub(super) fn fine(projection: &Projection, scale: f64) -> u32 {
     if matches!(projection, Projection::Texture) && scale >= 1.0 { 1 } else { 2 }
 }
 
-/// Calls `f` with the column, the row and the barycentric weights of every sample, one at the centre of each square of side 1 from (0, 0) to
-/// `size`, that lies in a triangle or at most `edge` of it beyond.
-pub(super) fn each_sample(corners: [[f64; 2]; 3], size: [u32; 2], edge: f64, mut f: impl FnMut(u32, u32, [f64; 2])) {
-    let [p, q, r] = corners;
-    let det = (q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0]);
-    if det.abs() < 1e-12 {
-        return;
-    }
-    let range = |k: usize| {
-        let (lo, hi) = (p[k].min(q[k]).min(r[k]), p[k].max(q[k]).max(r[k]));
-        let (most, room) = (f64::from(size[k]), edge * (hi - lo));
-        ((lo - 0.5 - room).ceil().clamp(0.0, most) as u32)..((hi + 0.5 + room).floor().clamp(0.0, most) as u32)
-    };
-    for j in range(1) {
-        for i in range(0) {
-            let at = [f64::from(i) + 0.5 - p[0], f64::from(j) + 0.5 - p[1]];
-            let b = (at[0] * (r[1] - p[1]) - at[1] * (r[0] - p[0])) / det;
-            let c = ((q[0] - p[0]) * at[1] - (q[1] - p[1]) * at[0]) / det;
-            if b.min(c).min(1.0 - b - c) >= -edge {
-                f(i, j, [b, c]);
-            }
-        }
-    }
-}
-
 impl<'a> Footprints<'a> {
     pub fn new(scene: &'a Scene, hits: &'a Hits, charting: &'a Charting) -> Self {
         Self { scene, hits, charting, members: members(charting) }
@@ -78,11 +54,11 @@ impl<'a> Footprints<'a> {
         let of = |(chart, faces): (usize, &Vec<u32>)| {
             let (size, place) = (sizes[chart], self.place(chart, sizes[chart]));
             let fine = fine(&self.charting.charts[chart].projection, scale);
+            let grid = Grid::new(self.charting, chart, place, fine);
             let mut mask = Mask::new(size[0], size[1]);
             for &face in faces {
                 let surface = self.charting.faces.list[face as usize].surface;
-                let corners = self.charting.outline(face as usize).map(|c| place.at(c).map(|v| v * f64::from(fine)));
-                each_sample(corners, size.map(|v| v * fine), EDGE, |x, y, shares| {
+                grid.each_sample(self.charting, face as usize, EDGE, |x, y, shares| {
                     let (x, y) = (x / fine, y / fine);
                     if !mask.has(x, y) && !is_hole(self.scene, surface / 2, self.charting.weights(face as usize, shares)) {
                         mask.set(x, y);

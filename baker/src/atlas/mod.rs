@@ -3,6 +3,7 @@
 
 mod fill;
 mod footprint;
+mod grid;
 mod mask;
 mod pack;
 mod palette;
@@ -171,7 +172,10 @@ pub fn build(scene: &Scene, hits: &Hits, settings: &Settings, progress: &(dyn Fn
         return Err(AtlasError::Side(settings.max_side));
     }
     progress(0, 4);
-    let charting = chart::build(scene, hits, settings.charts.family, settings.density.clamp(0.05, 8.0), settings.max_side);
+    let mut charting = chart::build(scene, hits, settings.charts.family, settings.density.clamp(0.05, 8.0), settings.max_side);
+    if settings.charts.rewarped {
+        chart::rewarp(hits, &mut charting);
+    }
     progress(1, 4);
     let (label_of, labels) = chart::assign(hits, &charting, WANTED_LABELS - 1);
     if labels + 1 > MAX_LABELS {

@@ -18,7 +18,7 @@ pub enum Family {
     Planes,
     /// As the camera sees it, along lines of sight and from points: curved and rough surfaces move as on the screen. For bodies and land.
     Sight,
-    /// As the scene itself has it flattened.
+    /// As the scene itself has it flattened, or its texture.
     #[default]
     Own,
 }
@@ -84,6 +84,9 @@ const DOUBLE: f64 = 3.0;
 pub struct Trial {
     /// How the surface was cut and flattened.
     pub family: Family,
+    /// Whether texels were moved inside its charts.
+    #[serde(default)]
+    pub rewarped: bool,
     /// Bytes that keys and packed source image are likely to take.
     pub bytes: u64,
     /// Mean PSNR against the antialiased scene at the size of the trial, dB.
@@ -103,13 +106,15 @@ impl Trial {
 pub struct Choice {
     /// The family chosen.
     pub family: Family,
+    /// Whether texels move inside charts to where their detail is seen; never where the scene's own are copied.
+    pub rewarped: bool,
     /// Trials; none where there was nothing to choose.
-    pub trials: [Option<Trial>; 3],
+    pub trials: [Option<Trial>; 4],
 }
 
 impl From<Family> for Choice {
     fn from(family: Family) -> Self {
-        Self { family, trials: [None; 3] }
+        Self { family, rewarped: false, trials: [None; 4] }
     }
 }
 
@@ -122,13 +127,15 @@ impl Choice {
 
 /// A choice and its reasons in words: "charts: sight (29.3 dB, 41 kB; planes: 29.1 dB, 48 kB)".
 #[must_use]
-pub fn reason<'t>(family: Family, tried: impl Iterator<Item = &'t Trial> + Clone) -> String {
+pub fn reason<'t>(family: Family, rewarped: bool, tried: impl Iterator<Item = &'t Trial> + Clone) -> String {
     let figures = |trial: &Trial| format!("{:.1} dB, {} kB", trial.psnr, trial.bytes.div_ceil(1000));
-    let own = tried.clone().filter(|t| t.family == family).map(figures);
-    let others = tried.filter(|t| t.family != family).map(|t| format!("{}: {}", t.family.name(), figures(t)));
+    let name = |family: Family, rewarped: bool| format!("{}{}", family.name(), if rewarped { " rewarped" } else { "" });
+    let chosen = |t: &&Trial| (t.family, t.rewarped) == (family, rewarped);
+    let own = tried.clone().filter(chosen).map(figures);
+    let others = tried.filter(|t| !chosen(t)).map(|t| format!("{}: {}", name(t.family, t.rewarped), figures(t)));
     let reasons: Vec<String> = own.chain(others).collect();
     let reasons = if reasons.is_empty() { String::new() } else { format!(" ({})", reasons.join("; ")) };
-    format!("charts: {}{reasons}", family.name())
+    format!("charts: {}{reasons}", name(family, rewarped))
 }
 
 #[cfg(test)]
@@ -137,12 +144,13 @@ mod tests {
 
     #[test]
     fn a_choice_names_what_was_tried() {
-        let trial = |family, bytes, psnr| Some(Trial { family, bytes, psnr });
-        let trials = [trial(Family::Planes, 50_000, 30.0), trial(Family::Sight, 25_000, 29.0), None];
-        let choice = Choice { family: Family::Sight, trials };
+        let trial = |family, rewarped, bytes, psnr| Some(Trial { family, rewarped, bytes, psnr });
+        let trials = [trial(Family::Planes, false, 50_000, 30.0), trial(Family::Sight, false, 25_000, 29.0), None, None];
+        let choice = Choice { family: Family::Sight, rewarped: false, trials };
         let worth: Vec<f64> = choice.tried().map(Trial::worth).collect();
         assert!(worth[1] > worth[0], "half the bytes are worth more than one dB");
-        assert_eq!(reason(choice.family, choice.tried()), "charts: sight (29.0 dB, 25 kB; planes: 30.0 dB, 50 kB)");
-        assert_eq!(reason(Family::Own, Choice::from(Family::Own).tried()), "charts: own");
+        assert_eq!(reason(choice.family, false, choice.tried()), "charts: sight (29.0 dB, 25 kB; planes: 30.0 dB, 50 kB)");
+        assert_eq!(reason(choice.family, true, choice.tried()), "charts: sight rewarped (planes: 30.0 dB, 50 kB; sight: 29.0 dB, 25 kB)");
+        assert_eq!(reason(Family::Own, false, Choice::from(Family::Own).tried()), "charts: own");
     }
 }

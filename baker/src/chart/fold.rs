@@ -154,8 +154,10 @@ fn examine<'t>(
     state: &mut [u8],
     touched: impl Fn(u32) -> &'t [Touch],
 ) -> Vec<Vec<u32>> {
-    let (Projection::Plane([_, _, normal]) | Projection::Point(_, [_, _, normal], _)) = charting.charts[chart as usize].projection else {
-        return Vec::new();
+    let normal = match charting.charts[chart as usize].projection {
+        Projection::Plane([_, _, normal]) | Projection::Point(_, [_, _, normal], _) => Some(normal),
+        Projection::Unwrapped(_) => None,
+        Projection::Texture => return Vec::new(),
     };
     if faces.iter().all(|&f| touched(f).is_empty()) {
         return Vec::new();
@@ -175,8 +177,14 @@ fn examine<'t>(
         state[seed as usize] = QUEUED;
         while let Some(f) = queue.pop_front() {
             let touches = touched(f);
-            let cosine = charting.faces.list[f as usize].normal.dot(normal).abs().max(0.2);
-            let slope = (1.0 / (cosine * cosine) - 1.0).sqrt();
+            let slope = match normal {
+                Some(normal) => {
+                    let cosine = charting.faces.list[f as usize].normal.dot(normal).abs().max(0.2);
+                    (1.0 / (cosine * cosine) - 1.0).sqrt()
+                }
+                // No step along the surface is more than what the face is stretched by, unless it is stretched much more one way.
+                None => 2.0 * charting.stretch(f as usize),
+            };
             let step = ((2.0 + 2.0 * slope) / g.density) as f32;
             let over = |t: &&Touch| (depth(t.depth) - depths[t.texel as usize]).abs() > step;
             let bad = touches.iter().filter(over).count();

@@ -28,7 +28,7 @@ pub(super) fn build(scene: &Scene, hits: &Hits, faces: Faces) -> Charting {
             *number
         })
         .collect();
-    let mut charting = Charting { faces, chart_of, corners: Vec::new(), charts };
+    let mut charting = Charting { faces, chart_of, corners: Vec::new(), warps: Vec::new(), charts };
     charting.flatten(scene);
     measure::bound(hits, &mut charting);
     // Whole texels, so that the texture's texels are the source image's.

@@ -13,7 +13,7 @@ const ALONE: usize = 127;
 
 /// The label of each chart, from 1, and the number of labels. Up to `limit` charts have a label each; beyond that the
 /// charts seen most keep theirs and the rest share, never two that are seen within neighbouring blocks of 16 pixels
-/// in neighbouring blocks of 16 frames.
+/// in neighbouring blocks of 16 frames. Where more than `limit` would be needed, the number may be too small, but not as small as `limit`.
 pub fn assign(hits: &Hits, charting: &Charting, limit: usize) -> (Vec<u16>, usize) {
     let count = charting.charts.len();
     if count <= limit {
@@ -26,7 +26,10 @@ pub fn assign(hits: &Hits, charting: &Charting, limit: usize) -> (Vec<u16>, usiz
     for (i, &c) in order.iter().take(alone).enumerate() {
         labels[c] = i as u16 + 1;
     }
-    let meets = meetings(hits, charting, &labels);
+    let meets = match meetings(hits, charting, &labels, limit.saturating_sub(alone) + 1) {
+        Ok(meets) => meets,
+        Err(crowd) => return (labels, alone + crowd),
+    };
     let mut most = alone;
     for &c in order.iter().skip(alone) {
         let taken: BTreeSet<u16> = meets[c].iter().map(|&o| labels[o as usize]).collect();
@@ -37,8 +40,9 @@ pub fn assign(hits: &Hits, charting: &Charting, limit: usize) -> (Vec<u16>, usiz
     (labels, most)
 }
 
-/// The charts without a label that each of them meets.
-fn meetings(hits: &Hits, charting: &Charting, labels: &[u16]) -> Vec<Vec<u32>> {
+/// The charts without a label that each of them meets. Fails with how many of them are in one block, if those alone are more than `most`: pairs of
+/// all that meet would then fill any memory.
+fn meetings(hits: &Hits, charting: &Charting, labels: &[u16], most: usize) -> Result<Vec<Vec<u32>>, usize> {
     let (width, height) = (hits.width as usize, hits.height as usize);
     let (across, down) = (width.div_ceil(BLOCK), height.div_ceil(BLOCK));
     let frame_size = (width * height).max(1);
@@ -57,6 +61,10 @@ fn meetings(hits: &Hits, charting: &Charting, labels: &[u16]) -> Vec<Vec<u32>> {
             seen
         })
         .collect();
+    let crowd = blocks.iter().flatten().map(BTreeSet::len).max().unwrap_or(0);
+    if crowd > most {
+        return Err(crowd);
+    }
     let mut pairs: Vec<(u32, u32)> = Vec::new();
     for (t, now) in blocks.iter().enumerate() {
         for (i, set) in now.iter().enumerate() {
@@ -76,5 +84,5 @@ fn meetings(hits: &Hits, charting: &Charting, labels: &[u16]) -> Vec<Vec<u32>> {
     for (a, b) in pairs {
         meets[a as usize].push(b);
     }
-    meets
+    Ok(meets)
 }

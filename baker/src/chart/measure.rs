@@ -11,6 +11,8 @@ use rayon::prelude::*;
 const SHARE: f64 = 0.9;
 /// Directions tried over half a turn for the chart's smallest rectangle.
 const TURNS: usize = 32;
+/// Charts in all tables together, at most, while there are two tables: 3 kB each.
+const TABLES: usize = 100_000;
 /// Histogram bins: 8 an octave of single-precision numbers from 2^-40 to 2^40.
 const BINS: usize = 640;
 const FIRST_BIN: u32 = (127 - 40) << 3;
@@ -71,8 +73,9 @@ pub(super) fn measure(scene: &Scene, hits: &Hits, charting: &mut Charting, densi
         [libm::cos(angle), libm::sin(angle)]
     });
     let frame_size = (hits.width * hits.height) as usize;
-    // Fixed chunks: as many as keep two dozen threads busy, few enough to hold a table of charts each.
-    let chunk = (hits.frames as usize).div_ceil(24).max(1) * frame_size;
+    // As many chunks as keep two dozen threads busy, few enough to hold a table of charts each. Whatever they are, the sums are the same.
+    let chunks = (TABLES / charting.charts.len().max(1)).clamp(2, 24);
+    let chunk = (hits.frames as usize).div_ceil(chunks).max(1) * frame_size;
     let tables: Vec<Vec<Option<Box<Figures>>>> = hits
         .samples
         .par_chunks(chunk.max(1))
@@ -92,7 +95,7 @@ pub(super) fn measure(scene: &Scene, hits: &Hits, charting: &mut Charting, densi
                     let unit = match chart.projection {
                         // Flattened lengths shrink with the distance from the view's eye.
                         Projection::Point(eye, [_, _, back], near) => ((eye - face.point(s)).dot(back) / near).max(1e-3),
-                        _ => 1.0,
+                        _ => charting.stretch(id),
                     };
                     figures.densities[bin(unit * lens.focal * (slant / (z * z * z)).sqrt())] += 1;
                     figures.hits += 1;
@@ -126,6 +129,10 @@ fn settle(chart: &mut Chart, figures: &Figures, turns: &[[f64; 2]; TURNS], densi
         let [x, y] = turns[best];
         let [u, v, n] = *axes;
         *axes = [u * x + v * y, v * x - u * y, n];
+    }
+    if let Projection::Unwrapped(map) = &mut chart.projection {
+        let ([x, y], [u, v]) = (turns[best], *map);
+        *map = [[0, 1].map(|k| u[k] * x + v[k] * y), [0, 1].map(|k| v[k] * x - u[k] * y)];
     }
     chart.hits = figures.hits;
     let (k, l) = (best, best + TURNS / 2);

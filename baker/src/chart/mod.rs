@@ -14,7 +14,9 @@ mod observe;
 mod price;
 mod refine;
 mod sight;
+mod unwrapped;
 mod view;
+mod warp;
 
 use crate::gbuffer::Hits;
 use crate::scene::Scene;
@@ -24,9 +26,15 @@ use view::View;
 pub use family::{Choice, Family, Trial, reason};
 pub use labels::assign;
 pub(crate) use observe::Faces;
+pub(crate) use unwrapped::Islands;
+pub use unwrapped::NoIslands;
+pub(crate) use warp::rewarp;
 
 /// Not a face, not a chart.
 pub(crate) const NONE: u32 = u32::MAX;
+
+/// What takes the place of depth where there is no projection: two surfaces that lie on each other in a texture are seldom level in it.
+const OBLIQUE: DVec3 = DVec3::new(0.48, 0.64, 0.6);
 
 /// How a chart is flattened.
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +45,8 @@ pub enum Projection {
     Point(DVec3, [DVec3; 3], f64),
     /// The scene's own texture coordinates; texels of the texture.
     Texture,
+    /// The model's texture coordinates, times this matrix (rows); about world units.
+    Unwrapped([[f64; 2]; 2]),
 }
 
 /// A region of the source image on which the map from the surface is continuous.
@@ -64,19 +74,24 @@ pub struct Charting {
     pub(crate) corners: Vec<[[f64; 4]; 3]>,
     /// The charts.
     pub charts: Vec<Chart>,
+    /// How each chart is warped; empty where none is.
+    pub(crate) warps: Vec<Option<warp::Warp>>,
 }
 
 impl Charting {
-    /// Flattened coordinates and depth of face `face` at barycentric `[b, c]`.
+    /// Flattened coordinates, warped where the chart is, and depth of face `face` at barycentric `[b, c]`.
     #[inline]
     pub(crate) fn flat(&self, face: usize, b: f64, c: f64) -> [f64; 3] {
         let [p, q, r] = &self.corners[face];
         let a = 1.0 - b - c;
         let [x, y, depth, w] = [0, 1, 2, 3].map(|k| a * p[k] + b * q[k] + c * r[k]);
-        [x / w, y / w, depth]
+        match self.warps.get(self.chart_of[face] as usize) {
+            Some(Some(warp)) => [warp[0].of(x / w), warp[1].of(y / w), depth],
+            _ => [x / w, y / w, depth],
+        }
     }
 
-    /// Flattened coordinates and depth of the corners of face `face`.
+    /// Flattened coordinates, not warped, and depth of the corners of face `face`.
     pub(crate) fn outline(&self, face: usize) -> [[f64; 3]; 3] {
         self.corners[face].map(|[x, y, depth, w]| [x / w, y / w, depth])
     }
@@ -101,6 +116,14 @@ impl Charting {
         sums.into_iter().map(|[depth, hits]| (depth / f64::max(hits, 1.0)).max(f64::MIN_POSITIVE)).collect()
     }
 
+    /// World units that a flattened unit covers on face `face`, as the side of a square; 1 where the projection tells.
+    pub(crate) fn stretch(&self, face: usize) -> f64 {
+        let Projection::Unwrapped(_) = self.charts[self.chart_of[face] as usize].projection else { return 1.0 };
+        let ([p, q, r], [a, b, c]) = (self.corners[face], self.faces.list[face].position);
+        let flat = ((q[0] - p[0]) * (r[1] - p[1]) - (q[1] - p[1]) * (r[0] - p[0])).abs();
+        ((b - a).cross(c - a).length() / flat.max(f64::MIN_POSITIVE)).sqrt()
+    }
+
     /// Computes the faces' flattened corners from the charts' projections.
     fn flatten(&mut self, scene: &Scene) {
         self.corners = self
@@ -119,6 +142,13 @@ impl Charting {
                     let size = islands::texture_size(scene, t.material);
                     t.uv.map(|uv| [f64::from(uv.x) * size[0], f64::from(uv.y) * size[1], 0.0, 1.0])
                 }
+                Projection::Unwrapped(map) => {
+                    let t = &scene.triangles[(face.surface / 2) as usize];
+                    [0, 1, 2].map(|k| {
+                        let [x, y] = map.map(|row| row[0] * f64::from(t.uv[k].x) + row[1] * f64::from(t.uv[k].y));
+                        [x, y, OBLIQUE.dot(face.position[k]), 1.0]
+                    })
+                }
             })
             .collect();
     }
@@ -131,7 +161,8 @@ pub fn brings_own(scene: &Scene) -> bool {
 }
 
 /// Cuts what is seen into charts with at most `density` texels a pixel, for a source image of sides up to `max_side`. The scene's own flattening
-/// is kept at `density` of its texels, at most all; `Family::Own` is `Family::Planes` for a scene without.
+/// is kept at `density` of its texels, at most all. `Family::Own` is the model's texture for a scene without, and `Family::Planes` where that does
+/// not flatten it.
 pub fn build(scene: &Scene, hits: &Hits, family: Family, density: f64, max_side: u32) -> Charting {
     let own = family == Family::Own && brings_own(scene);
     let (faces, links) = observe::observe(scene, hits, !own);
@@ -141,16 +172,18 @@ pub fn build(scene: &Scene, hits: &Hits, family: Family, density: f64, max_side:
         charting.charts.iter_mut().for_each(|chart| chart.density *= density.min(1.0));
         return charting;
     }
+    let islands = if family == Family::Own { Islands::new(scene).ok() } else { None };
+    let cut = !islands.as_ref().is_some_and(|islands| islands.hold(&faces));
     let mut candidates: Vec<merge::Clusters> = Vec::new();
-    let merging = merge::Merging::new(scene, &faces, &links, family);
-    for &weights in family.weights() {
+    let merging = cut.then(|| merge::Merging::new(scene, &faces, &links, family));
+    for (merging, &weights) in merging.iter().flat_map(|merging| family.weights().iter().map(move |weights| (merging, weights))) {
         let mut clusters = merging.merge(weights);
         absorb::absorb(&faces, &links, &mut clusters, hits.samples.len());
         if candidates.iter().all(|c| c.of != clusters.of) {
             candidates.push(clusters);
         }
     }
-    let mut charting = Charting { charts: Vec::new(), chart_of: Vec::new(), corners: Vec::new(), faces };
+    let mut charting = Charting { charts: Vec::new(), chart_of: Vec::new(), corners: Vec::new(), warps: Vec::new(), faces };
     let mut best: Option<(f64, Vec<u32>, Vec<Chart>)> = None;
     for clusters in candidates {
         let chart =
@@ -165,6 +198,10 @@ pub fn build(scene: &Scene, hits: &Hits, family: Family, density: f64, max_side:
     }
     if let Some((_, chart_of, charts)) = best {
         (charting.chart_of, charting.charts) = (chart_of, charts);
+    }
+    if let Some(islands) = islands {
+        islands.take(scene, &mut charting);
+        measure::measure(scene, hits, &mut charting, density, max_side);
     }
     charting.flatten(scene);
     if fold::split(hits, &mut charting, &links) {

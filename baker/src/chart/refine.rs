@@ -14,6 +14,8 @@ use std::cmp::Reverse;
 const MANY: usize = 10_000;
 /// How far, as a cosine, normals of a group may stray from its first: 8, 12, 18 and 25 degrees.
 const GROUPS: [f64; 4] = [0.990, 0.978, 0.951, 0.906];
+/// Where faces are many, rounds end when fewer than one in so many changes sides.
+const SETTLED: usize = 200;
 /// Rounds in which faces may change sides.
 const ROUNDS: usize = 6;
 
@@ -71,7 +73,8 @@ pub(super) fn refine(
 ) -> Clusters {
     for _ in 0..ROUNDS {
         turn(faces, family, &of, &mut sides);
-        if !exchange(faces, links, (family, weights), &mut of, &sides) {
+        let moved = exchange(faces, links, (family, weights), &mut of, &sides);
+        if moved <= if of.len() > MANY { of.len() / SETTLED } else { 0 } {
             break;
         }
     }
@@ -79,9 +82,9 @@ pub(super) fn refine(
     components(links, &of, &sides)
 }
 
-/// Moves each face to the neighbouring cluster where it costs least; returns whether any moved.
-fn exchange(faces: &Faces, links: &Links, (family, weights): (Family, Weights), of: &mut [u32], sides: &[Side]) -> bool {
-    let mut moved = false;
+/// Moves each face to the neighbouring cluster where it costs least; returns how many moved.
+fn exchange(faces: &Faces, links: &Links, (family, weights): (Family, Weights), of: &mut [u32], sides: &[Side]) -> usize {
+    let mut moved = 0;
     let mut around: Vec<(u32, Border)> = Vec::new();
     for f in 0..of.len() {
         around.clear();
@@ -110,7 +113,7 @@ fn exchange(faces: &Faces, links: &Links, (family, weights): (Family, Weights), 
         };
         let stay = (of[f], price(&around[0]));
         let (to, _) = around.iter().map(|a| (a.0, price(a))).fold(stay, |least, a| if a.1 < least.1 - 1e-9 { a } else { least });
-        moved |= to != of[f];
+        moved += usize::from(to != of[f]);
         of[f] = to;
     }
     moved
