@@ -117,9 +117,8 @@ fn texels_take_what_their_kind_says() {
         assert_eq!(packed.1.workspace - raw.1.workspace, bytes + mask);
         assert!(packed.0 < raw.0 * 6 / 10, "{} of {}", packed.0, raw.0);
     }
-    // The mask stays; the palette is shorter, and lengths may take a byte less.
-    let saved = texels / 2 + 2 * (eight[0].1.image.colours - 16);
-    assert!((saved..saved + 4).contains(&(eight[0].0 - four[0].0)), "{} {}", eight[0].0, four[0].0);
+    // The mask stays. Keys differ by a few bytes, since what shows wrong depends on the colours there are: pictures are compared, not bundles.
+    assert_eq!(eight[0].1.image.stored_bytes - four[0].1.image.stored_bytes, texels / 2);
     assert!(four[1].1.image.stored_bytes * 2 < eight[1].1.image.stored_bytes);
     assert_eq!(eight[0].1.workspace - four[0].1.workspace, 2 * (256 - 16));
 }
