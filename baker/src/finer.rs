@@ -17,44 +17,53 @@ const SMALLEST: u32 = 4;
 /// The longest interval between keys, frames.
 const LONGEST: u32 = 256;
 
-/// What was kept: the settings, the bundle, and what the user should know about it.
-type Kept = (Settings, Encoded, Vec<String>);
+/// A bundle, what made it, and how good it is.
+pub(crate) struct Made {
+    pub settings: Settings,
+    pub encoded: Encoded,
+    pub quality: Quality,
+}
 
-/// `encoded`, which `settings` made, or a bundle of smaller cells if that is worth more, as sparing counts it.
+impl Made {
+    /// Quality less what `picture` bytes leave for keys, dB.
+    fn worth(&self, picture: usize) -> f64 {
+        metrics::worth(self.quality.psnr_mean, self.encoded.bundle.len().saturating_sub(picture) as u64, DOUBLE)
+    }
+
+    fn memory(&self) -> String {
+        Bundle::parse(&self.encoded.bundle).map(|bundle| grouped(bundle.memory_needed())).unwrap_or_default()
+    }
+}
+
+/// `coarse`, or a bundle of smaller cells if that is worth more, as sparing counts it; and then what the user should know about it.
 ///
 /// # Errors
 /// Those of encoding, and of the player.
-pub(crate) fn choose(scene: &Scene, flat: &Flat, settings: Settings, encoded: Encoded, progress: Progress<'_>) -> Result<Kept, BakeError> {
-    let quality = |encoded: &Encoded| verify::against_exact(&encoded.bundle, &flat.atlas, &|_, _| {});
-    let coarse = quality(&encoded)?;
-    if coarse.wrong_surface_percent < TORN || settings.cell / 2 < SMALLEST || settings.key_interval * 2 > LONGEST {
-        return Ok((settings, encoded, Vec::new()));
+pub(crate) fn choose(scene: &Scene, flat: &Flat, coarse: Made, progress: Progress<'_>) -> Result<(Made, Option<String>), BakeError> {
+    let Settings { cell, key_interval, .. } = coarse.settings;
+    if coarse.quality.wrong_surface_percent < TORN || cell / 2 < SMALLEST || key_interval * 2 > LONGEST {
+        return Ok((coarse, None));
     }
     progress("trying smaller cells", 0.0);
-    let smaller = Settings { cell: settings.cell / 2, key_interval: settings.key_interval * 2, ..settings };
-    let finer = bake::encode(scene, flat, &smaller, &|_, _| {})?;
+    let settings = Settings { cell: cell / 2, key_interval: key_interval * 2, ..coarse.settings };
+    let encoded = bake::encode(scene, flat, &settings, &|_, _| {})?;
+    let quality = verify::against_exact(&encoded.bundle, &flat.atlas, &|_, _| {})?;
+    let fine = Made { settings, encoded, quality };
     let picture = image_bytes(&flat.atlas.image, settings.atlas.storage);
-    let keys = |encoded: &Encoded| encoded.bundle.len().saturating_sub(picture) as u64;
-    let worth = |encoded: &Encoded, quality: &Quality| metrics::worth(quality.psnr_mean, keys(encoded), DOUBLE);
-    let fine = quality(&finer)?;
-    if worth(&finer, &fine) <= worth(&encoded, &coarse) {
-        return Ok((settings, encoded, Vec::new()));
+    if fine.worth(picture) <= coarse.worth(picture) {
+        return Ok((coarse, None));
     }
-    let memory = |encoded: &Encoded| Bundle::parse(&encoded.bundle).map(|bundle| grouped(bundle.memory_needed())).unwrap_or_default();
     let said = format!(
-        "many outlines cross every cell: --cell {} --key-interval {} are used, {:.1} dB in place of {:.1} with {} and {}, at {} B of working memory in \
-         place of {}; give --cell {} for the latter",
-        smaller.cell,
-        smaller.key_interval,
-        fine.psnr_mean,
-        coarse.psnr_mean,
+        "many outlines cross every cell: --cell {} --key-interval {} are used, {:.1} dB in place of {:.1} with {cell} and {key_interval}, at {} B of \
+         working memory in place of {}; give --cell {cell} for the latter",
         settings.cell,
         settings.key_interval,
-        memory(&finer),
-        memory(&encoded),
-        settings.cell
+        fine.quality.psnr_mean,
+        coarse.quality.psnr_mean,
+        fine.memory(),
+        coarse.memory(),
     );
-    Ok((smaller, finer, vec![said]))
+    Ok((fine, Some(said)))
 }
 
 #[cfg(test)]
@@ -62,30 +71,32 @@ mod tests {
     use super::*;
     use crate::scene::builtin;
 
-    #[test]
-    fn pictures_that_come_out_right_keep_their_cells() {
-        let mut scene = builtin::build("cone-orbit").unwrap();
-        (scene.playback.width, scene.playback.height, scene.playback.frames) = (80, 60, 9);
-        let settings = Settings::default();
+    fn made(name: &str, size: [u32; 2], frames: u32, settings: Settings) -> (Scene, Flat, Made) {
+        let mut scene = builtin::build(name).unwrap();
+        (scene.playback.width, scene.playback.height, scene.playback.frames) = (size[0], size[1], frames);
         let flat = bake::flatten(&scene, &settings.atlas, &|_, _| {}).unwrap();
         let encoded = bake::encode(&scene, &flat, &settings, &|_, _| {}).unwrap();
-        let bytes = encoded.bundle.clone();
-        let (kept, encoded, said) = choose(&scene, &flat, settings, encoded, &|_, _| {}).unwrap();
-        assert_eq!((kept.cell, encoded.bundle == bytes, said.len()), (settings.cell, true, 0));
+        let quality = verify::against_exact(&encoded.bundle, &flat.atlas, &|_, _| {}).unwrap();
+        (scene, flat, Made { settings, encoded, quality })
+    }
+
+    #[test]
+    fn pictures_that_come_out_right_keep_their_cells() {
+        let (scene, flat, coarse) = made("cone-orbit", [80, 60], 9, Settings::default());
+        let bytes = coarse.encoded.bundle.clone();
+        let (kept, said) = choose(&scene, &flat, coarse, &|_, _| {}).unwrap();
+        assert_eq!((kept.settings.cell, kept.encoded.bundle == bytes, said), (Settings::default().cell, true, None));
     }
 
     #[test]
     fn a_fence_gets_smaller_cells() {
         // Columns seen so small that many stand in every cell of 16 pixels.
-        let mut scene = builtin::build("round-columns").unwrap();
-        (scene.playback.width, scene.playback.height, scene.playback.frames) = (64, 48, 17);
         let settings = Settings { cell: 16, key_interval: 4, ..Settings::default() };
-        let flat = bake::flatten(&scene, &settings.atlas, &|_, _| {}).unwrap();
-        let encoded = bake::encode(&scene, &flat, &settings, &|_, _| {}).unwrap();
-        let before = verify::against_exact(&encoded.bundle, &flat.atlas, &|_, _| {}).unwrap();
-        let (kept, encoded, said) = choose(&scene, &flat, settings, encoded, &|_, _| {}).unwrap();
-        let after = verify::against_exact(&encoded.bundle, &flat.atlas, &|_, _| {}).unwrap();
-        assert_eq!((kept.cell, kept.key_interval, said.len()), (8, 8, 1));
-        assert!(after.psnr_mean > before.psnr_mean + 0.5, "{before:?} {after:?}");
+        let (scene, flat, coarse) = made("round-columns", [64, 48], 17, settings);
+        let before = coarse.quality.psnr_mean;
+        let (kept, said) = choose(&scene, &flat, coarse, &|_, _| {}).unwrap();
+        let after = verify::against_exact(&kept.encoded.bundle, &flat.atlas, &|_, _| {}).unwrap();
+        assert_eq!((kept.settings.cell, kept.settings.key_interval, said.is_some()), (8, 8, true));
+        assert!(after.psnr_mean > before + 0.5 && after.psnr_mean == kept.quality.psnr_mean, "{before} {after:?}");
     }
 }

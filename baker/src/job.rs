@@ -5,7 +5,7 @@ use crate::atlas::{self, Storage};
 use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings};
 use crate::chart::{self, Choice, Family};
 use crate::choose;
-use crate::finer;
+use crate::finer::{self, Made};
 use crate::inspect::Inspection;
 use crate::report::{Origin, Report, Seconds};
 use crate::scene::Scene;
@@ -182,18 +182,21 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
             let flat = bake::flatten(scene, &settings.atlas, progress)?;
             something_seen(&flat)?;
             let encoded = bake::encode(scene, &flat, &settings, progress)?;
-            let free = options.cell.is_none() && options.key_interval.is_none();
-            let (settings, encoded, warnings) =
-                if free { finer::choose(scene, &flat, settings, encoded, progress)? } else { (settings, encoded, Vec::new()) };
-            Chosen { flat, encoded, settings, search_seconds: 0.0, warnings }
+            Chosen { flat, encoded, settings, search_seconds: 0.0, warnings: Vec::new() }
         }
         goal => tune::search(scene, options, goal, progress)?,
     };
-    let verify_start = Instant::now();
+    let exact_start = Instant::now();
     let part = |done: u32, total: u32| f64::from(done) / f64::from(total.max(1));
     progress("comparing with exact rays", 0.0);
-    let inspection = Inspection::of(&encoded.bundle).map_err(verify::VerifyError::from)?;
     let quality = verify::against_exact(&encoded.bundle, &flat.atlas, &|d, n| progress("comparing with exact rays", part(d, n)))?;
+    let (exact_seconds, finer_start) = (exact_start.elapsed().as_secs_f64(), Instant::now());
+    let free = options.goal == Goal::AsSet && options.cell.is_none() && options.key_interval.is_none();
+    let made = Made { settings, encoded, quality };
+    let (made, finer) = if free { finer::choose(scene, &flat, made, progress)? } else { (made, None) };
+    let Made { settings, encoded, quality } = made;
+    let (search_seconds, verify_start) = (search_seconds + finer_start.elapsed().as_secs_f64(), Instant::now());
+    let inspection = Inspection::of(&encoded.bundle).map_err(verify::VerifyError::from)?;
     let work = verify::work(&encoded.bundle)?;
     let frames = match options.truth {
         TruthFrames::None => Vec::new(),
@@ -214,12 +217,12 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
         atlas: flat.atlas_seconds,
         rays: flat.ray_seconds,
         encode: encoded.seconds,
-        verify: verify_start.elapsed().as_secs_f64(),
+        verify: exact_seconds + verify_start.elapsed().as_secs_f64(),
         search: choice_seconds + search_seconds,
     };
     let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings };
     let mut report = Report::new(&origin, &inspection, quality, truth, work, seconds);
-    report.warnings.extend(warnings);
+    report.warnings.extend(warnings.into_iter().chain(finer));
     Ok(Baked { bundle: encoded.bundle, report, flat })
 }
 

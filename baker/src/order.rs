@@ -127,7 +127,7 @@ fn observe(evidence: &Evidence<'_>, index: usize, list: &[u8]) -> Vec<Group> {
         let distances = fields.map(|fields| points(&field_patches, &fields.distance, &linear));
         grid.each_pixel(frame, cell, |pixel, at| {
             let sheet = list.iter().position(|&label| u16::from(label) == gbuffer.label[pixel]).unwrap_or(NO_SHEET);
-            let right = colour(image, gbuffer.uv[pixel]);
+            let right = image.colour_at(gbuffer.uv[pixel]);
             let mut costs = [0; MAX_SHEETS];
             let around = patch::around(at);
             let mix = |points: &AtPoints| patch::value(points, around);
@@ -136,7 +136,7 @@ fn observe(evidence: &Evidence<'_>, index: usize, list: &[u8]) -> Vec<Group> {
                 let uv = mix(&positions[place]);
                 covering |= u32::from(covers(image, label, uv)) << place;
                 if place != sheet {
-                    costs[place] = cost(right, colour(image, uv));
+                    costs[place] = cost(right, image.colour_at(uv));
                 }
                 if let Some((fields, distances)) = fields.zip(distances.as_ref()) {
                     let [a, b]: [f32; 2] = mix(&distances[place]);
@@ -149,12 +149,6 @@ fn observe(evidence: &Evidence<'_>, index: usize, list: &[u8]) -> Vec<Group> {
         });
     }
     seen.into_iter().map(|((sheet, covering), cost)| Group { sheet, covering, cost }).collect()
-}
-
-/// The colour of the texel at a position, or of the nearest there is.
-fn colour(image: &SourceImage, [u, v]: [f32; 2]) -> [u8; 3] {
-    let (x, y) = ((u.max(0.0) as u32).min(image.width - 1), (v.max(0.0) as u32).min(image.height - 1));
-    image.colour(image.texels[(y * image.width + x) as usize])
 }
 
 /// What it costs to show a colour of a wrong sheet.

@@ -188,8 +188,7 @@ pub fn play(bytes: &[u8], frames: &[u32], mut show: impl FnMut(u32, &[u8])) -> R
 #[must_use]
 pub fn exact_frame(atlas: &Atlas, frame: u32) -> Vec<u8> {
     let (image, gbuffer) = (&atlas.image, &atlas.gbuffer);
-    let colour = |uv: &[f32; 2]| image.colour(image.texels[uv[1] as usize * image.width as usize + uv[0] as usize]);
-    gbuffer.uv[pixels_of(gbuffer, frame)].iter().flat_map(colour).collect()
+    gbuffer.uv[pixels_of(gbuffer, frame)].iter().flat_map(|&uv| image.colour_at(uv)).collect()
 }
 
 fn pixels_of(gbuffer: &GBuffer, frame: u32) -> std::ops::Range<usize> {

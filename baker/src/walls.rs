@@ -1,6 +1,5 @@
 //! Walls: where the camera goes through a surface on its way from frame to frame. Paths come with the scene, hits from the tracer; the report warns.
 
-use crate::gbuffer::Lens;
 use crate::scene::Scene;
 use crate::trace::Tracer;
 
@@ -14,20 +13,19 @@ const CUT: f64 = 20.0;
 pub fn crossed(scene: &Scene, tracer: &Tracer<'_>) -> Vec<u32> {
     let play = &scene.playback;
     let last = if play.looping { play.frames } else { play.frames.saturating_sub(1) };
-    let eyes = |frame: u32| (0..=STEPS).map(move |step| Lens::at(scene, f64::from(frame) + f64::from(step) / f64::from(STEPS)).eye);
-    let length = |frame: u32| Lens::new(scene, frame).eye.distance(Lens::at(scene, f64::from(frame) + 1.0).eye);
-    let mut lengths: Vec<f64> = (0..last).map(length).collect();
-    let ways = lengths.clone();
-    lengths.sort_by(f64::total_cmp);
-    let longest = CUT * lengths.get(lengths.len() / 2).copied().unwrap_or(0.0);
+    let eye = |frame: f64| scene.camera.pose(play.parameter(frame)).eye;
+    let way = |frame: u32| eye(f64::from(frame)).distance(eye(f64::from(frame + 1)));
+    let mut ways: Vec<f64> = (0..last).map(way).collect();
+    ways.sort_by(f64::total_cmp);
+    let longest = CUT * ways.get(ways.len() / 2).copied().unwrap_or(0.0);
     let through = |frame: u32| {
-        eyes(frame).zip(eyes(frame).skip(1)).any(|(from, to)| {
-            let way = to - from;
-            let far = way.length();
-            far > 0.0 && tracer.hit(from, way / far).is_some_and(|hit| hit.t < far)
+        (0..STEPS).any(|step| {
+            let [from, to] = [step, step + 1].map(|step| eye(f64::from(frame) + f64::from(step) / f64::from(STEPS)));
+            let far = from.distance(to);
+            far > 0.0 && tracer.hit(from, (to - from) / far).is_some_and(|hit| hit.t < far)
         })
     };
-    (0..last).filter(|&frame| ways[frame as usize] <= longest && through(frame)).collect()
+    (0..last).filter(|&frame| way(frame) <= longest && through(frame)).collect()
 }
 
 #[cfg(test)]

@@ -143,7 +143,7 @@ impl Cursor {
     /// The cell to the right.
     #[must_use]
     pub fn next(self, lists: &Lists<'_>) -> Self {
-        Self { at: self.at.saturating_add(bytes(lists.sheets(self).labels.len())) }
+        self.past(lists.sheets(self))
     }
 }
 

@@ -201,8 +201,7 @@ impl Site<'_, '_, '_> {
     /// Block `block` of strip `strip`.
     #[must_use]
     pub fn block(&self, block: u32, strip: u32) -> Block<'_, '_> {
-        let quarter = self.cubic().then_some([block & 1 == 1, strip & 1 == 1]);
-        Block { rows: self.rows, quarter }
+        if self.cubic() { self.quarter(block, strip) } else { Block { rows: self.rows, quarter: None } }
     }
 }
 

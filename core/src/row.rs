@@ -200,7 +200,7 @@ impl Chain {
 /// One row of nodes at one moment, in caller's memory: label by label, in chains.
 #[derive(Debug)]
 pub struct NodeRow<'m> {
-    /// The chains, and how many there are.
+    /// The chains.
     pub chain: &'m mut [Chain],
     /// How many there are.
     pub chains: usize,

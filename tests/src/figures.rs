@@ -51,8 +51,7 @@ pub fn quality(bytes: &[u8], atlas: &Atlas) -> Result<Quality> {
         let exact = frame as usize * size..(frame as usize + 1) * size;
         let mut squares = 0u64;
         for (pixel, uv) in play::pixels(player).into_iter().zip(&gbuffer.uv[exact.clone()]) {
-            let texel = image.texels[uv[1] as usize * image.width as usize + uv[0] as usize];
-            let pairs = widen(pixel).into_iter().zip(image.palette[usize::from(texel)]);
+            let pairs = widen(pixel).into_iter().zip(image.colour_at(*uv));
             squares += pairs.map(|(a, b)| u64::from(a.abs_diff(b)).pow(2)).sum::<u64>();
         }
         let psnr = psnr(squares, 3 * size);

@@ -138,6 +138,15 @@ impl SourceImage {
     pub fn colour(&self, texel: u16) -> [u8; 3] {
         self.palette.get(usize::from(texel)).copied().unwrap_or_default()
     }
+
+    /// The colour at a position, texels; outside the image that of the nearest texel.
+    #[inline]
+    #[must_use]
+    pub fn colour_at(&self, [u, v]: [f32; 2]) -> [u8; 3] {
+        // What is below zero comes to zero.
+        let (x, y) = ((u as u32).min(self.width - 1), (v as u32).min(self.height - 1));
+        self.colour(self.texels[(y * self.width + x) as usize])
+    }
 }
 
 /// What the reports say about the source image.

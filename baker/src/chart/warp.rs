@@ -37,13 +37,11 @@ impl Axis {
         let t = x - self.lo;
         let i = (t / self.step).clamp(0.0, (PIECES - 1) as f64) as usize;
         let t = t - i as f64 * self.step;
-        if t < 0.0 || t > self.step {
-            return self.at[i]
-                + if t < 0.0 {
-                    t * self.slope[i]
-                } else {
-                    self.step * 0.5 * (self.slope[i] + self.slope[i + 1]) + (t - self.step) * self.slope[i + 1]
-                };
+        if t < 0.0 {
+            return self.at[i] + t * self.slope[i];
+        }
+        if t > self.step {
+            return self.at[i + 1] + (t - self.step) * self.slope[i + 1];
         }
         self.at[i] + t * (self.slope[i] + 0.5 * t / self.step * (self.slope[i + 1] - self.slope[i]))
     }
