@@ -75,6 +75,12 @@ pub struct TruthQuality {
     pub psnr_mean: f64,
     /// The same where outlines are softened as they are drawn, dB.
     pub psnr_smooth: f64,
+    /// That of frames whose texels are dithered, as `Player::dithered_row` draws them.
+    pub psnr_dithered: f64,
+    /// That of frames whose texels are bilinear, as `Player::bilinear_row` draws them.
+    pub psnr_bilinear: f64,
+    /// That of frames with both softened outlines and bilinear texels, as `Player::fine_row` draws them.
+    pub psnr_fine: f64,
     /// Mean of the frames' SSIM.
     pub ssim_mean: f64,
     /// How many frames were compared, evenly spread over the path.
@@ -111,6 +117,9 @@ pub fn rgb(pixel: u16) -> [u8; 3] {
     [r << 3 | r >> 2, g << 2 | g >> 4, b << 3 | b >> 2].map(|v| v as u8)
 }
 
+/// One of the player's ways to draw a row.
+type Row<'a> = fn(&mut Player<'a, AnyTexels>, u32, &mut [u16]);
+
 /// Renders frames of a bundle into memory of its own.
 pub struct Screen<'p, 'a> {
     player: &'p mut Player<'a, AnyTexels>,
@@ -131,13 +140,8 @@ impl<'p, 'a> Screen<'p, 'a> {
         self.draw(out, Player::row);
     }
 
-    /// The current frame with softened outlines into `out`: R, G, B, row by row.
-    fn smooth(&mut self, out: &mut Vec<u8>) {
-        self.draw(out, Player::smooth_row);
-    }
-
     /// The current frame into `out` as `row` draws it: R, G, B, row by row.
-    fn draw(&mut self, out: &mut Vec<u8>, row: fn(&mut Player<'a, AnyTexels>, u32, &mut [u16])) {
+    fn draw(&mut self, out: &mut Vec<u8>, row: Row<'a>) {
         out.clear();
         for y in 0..self.height {
             row(self.player, y, &mut self.row);
@@ -321,7 +325,7 @@ pub fn against_truth(
 ) -> Result<TruthQuality, VerifyError> {
     let bundle = Bundle::parse(bytes)?;
     let width = bundle.size().0 as usize;
-    let (mut psnr, mut smooth, mut ssim) = (0.0, 0.0, 0.0);
+    let (mut psnr, mut others, mut ssim) = (0.0, [0.0; 4], 0.0);
     with_screen(&bundle, |mut screen| {
         let mut played = Vec::new();
         for (done, &frame) in (1..).zip(frames) {
@@ -329,13 +333,25 @@ pub fn against_truth(
             screen.play(frame, &mut played);
             psnr += metrics::psnr(metrics::mean_squared_error(&played, &exact));
             ssim += metrics::ssim(&played, &exact, width);
-            screen.smooth(&mut played);
-            smooth += metrics::psnr(metrics::mean_squared_error(&played, &exact));
+            let ways: [Row<'_>; 4] = [Player::smooth_row, Player::dithered_row, Player::bilinear_row, Player::fine_row];
+            for (sum, row) in others.iter_mut().zip(ways) {
+                screen.draw(&mut played, row);
+                *sum += metrics::psnr(metrics::mean_squared_error(&played, &exact));
+            }
             progress(done, frames.len() as u32);
         }
     })?;
     let count = frames.len().max(1) as f64;
-    Ok(TruthQuality { psnr_mean: psnr / count, psnr_smooth: smooth / count, ssim_mean: ssim / count, truth_frames: frames.len() as u32 })
+    let [psnr_smooth, psnr_dithered, psnr_bilinear, psnr_fine] = others.map(|sum| sum / count);
+    Ok(TruthQuality {
+        psnr_mean: psnr / count,
+        psnr_smooth,
+        psnr_dithered,
+        psnr_bilinear,
+        psnr_fine,
+        ssim_mean: ssim / count,
+        truth_frames: frames.len() as u32,
+    })
 }
 
 /// Plays all frames in order on one thread and counts the work.

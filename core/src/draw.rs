@@ -16,8 +16,11 @@ pub trait Paint {
     /// Made so often that loops of their own pay.
     const OFTEN: bool;
 
-    /// The pixel at `uv`, which is inside the picture.
-    fn at(&self, uv: PlayUv, label: u8) -> Self::Pixel;
+    /// How far around a position pixels are told from, Q16 texels.
+    const REACH: i32;
+
+    /// The pixel at `uv`, which is inside the picture; `x`: whether it is an odd one of its row.
+    fn at(&self, uv: PlayUv, label: u8, x: usize) -> Self::Pixel;
 
     /// A run's pixels, in windows of 2^ROWS rows of 2^WIDTH texels, `TEXELS` in all; `log2`: of a block's pixels.
     fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [Self::Pixel], log2: u32);
@@ -30,14 +33,15 @@ pub struct Probes;
 impl Paint for Probes {
     type Pixel = Probe;
     const OFTEN: bool = false;
+    const REACH: i32 = 0;
 
-    fn at(&self, uv: PlayUv, label: u8) -> Probe {
+    fn at(&self, uv: PlayUv, label: u8, _: usize) -> Probe {
         Probe { label, at: uv }
     }
 
     fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [Probe], log2: u32) {
         let label = run.label as u8;
-        span::any_run(edges, out, log2, |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(run.row) });
+        span::any_run(edges, out, log2, |at: Packed<WIDTH, ROWS>, _| Probe { label, at: at.at(run.row) });
     }
 }
 
@@ -76,8 +80,8 @@ impl<'d, 'a> Drawing<'d, 'a> {
     fn runs<'o, P: Paint>(&mut self, y: u32, out: &'o mut [P::Pixel], work: &mut Work, paint: &P) -> &'o mut [P::Pixel] {
         let log2 = self.site.log2();
         let (strip, row) = (y >> log2, y & (1u32 << log2).wrapping_sub(1));
-        if self.plan.strip != Some(strip) || self.plan.row > row {
-            self.plan.make(&self.site, strip);
+        if self.plan.strip != Some(strip) || self.plan.row > row || self.plan.reach != P::REACH {
+            self.plan.make(&self.site, strip, P::REACH);
         }
         self.plan.skip_to(row);
         let width = self.site.bundle.size().0 as usize;
@@ -137,21 +141,6 @@ impl Mixed {
         let last = first.wrapping_add(1 << log2).min(row.len());
         row.get_mut(first..last)
     }
-}
-
-/// The mean of four colours, RGB565, rounded to nearest, halves up.
-#[must_use]
-pub const fn mean([a, b, c, d]: [u16; 4]) -> u16 {
-    // Red and blue apart from green, so that sums of four have room: bits 0..5, 11..16, and 5..11 above them.
-    const fn spread(colour: u16) -> u32 {
-        let colour = colour as u32;
-        (colour | colour << 16) & 0x07e0_f81f
-    }
-    // Two in the bit below each component rounds.
-    const HALF: u32 = 2 | 2 << 11 | 2 << 21;
-    let sum = spread(a).wrapping_add(spread(b)).wrapping_add(spread(c)).wrapping_add(spread(d)).wrapping_add(HALF);
-    let mean = sum >> 2 & 0x07e0_f81f;
-    (mean | mean >> 16) as u16
 }
 
 /// A run's pixels by the width of the picture: those that `plan` has windows for.
@@ -259,7 +248,7 @@ fn block<P: Paint, const EIGHT: bool>(
             shown = span::inside(&site.chart(sheet), shown, pixels.len(), span, &texture);
         }
         if shown != 0 {
-            span::paint(pixels, shown, span, &texture, |uv| paint.at(uv, sheet.label()));
+            span::paint(pixels, shown, span, &texture, |uv, x| paint.at(uv, sheet.label(), x));
             left &= !shown;
         }
     }
@@ -268,27 +257,5 @@ fn block<P: Paint, const EIGHT: bool>(
         if left.wrapping_shr(index as u32) & 1 != 0 {
             *pixel = P::Pixel::default();
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::mean;
-
-    #[test]
-    fn means_are_those_of_each_component() {
-        let colour = |r: u16, g: u16, b: u16| r << 11 | g << 5 | b;
-        let mut seed = 7u32;
-        let mut next = |below: u16| {
-            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (seed >> 16) as u16 % below
-        };
-        for _ in 0..2000 {
-            let parts: [[u16; 3]; 4] = core::array::from_fn(|_| [next(32), next(64), next(32)]);
-            let part = |get: fn([u16; 3]) -> u16| (parts.map(get).iter().sum::<u16>() + 2) >> 2;
-            let [r, g, b] = [part(|[r, _, _]| r), part(|[_, g, _]| g), part(|[_, _, b]| b)];
-            assert_eq!(mean(parts.map(|[r, g, b]| colour(r, g, b))), colour(r, g, b));
-        }
-        assert_eq!(mean([u16::MAX; 4]), u16::MAX);
     }
 }

@@ -95,6 +95,7 @@ mod coverage;
 mod draw;
 mod error;
 mod field;
+mod filter;
 pub mod fixed;
 pub mod format;
 mod graphics;

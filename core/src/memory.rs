@@ -159,6 +159,7 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, texture: Texture<'m>) -
             mixes: 0,
             last: [0; 2],
             strip: None,
+            reach: 0,
             row: 0,
             smooth: 0,
             torn: 0,

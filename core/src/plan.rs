@@ -118,7 +118,7 @@ pub const fn halves(width_log2: u32, rows_log2: u32) -> [u32; 2] {
     [1u32.wrapping_shl(bits.wrapping_sub(1)), 1u32.wrapping_shl(30u32.wrapping_sub(bits))]
 }
 
-/// Positions in runs keep this far from the edges of picture and window, Q16 texels: more than rounding moves them.
+/// Positions in runs keep this far from the edges of picture and window, Q16 texels, beside what pixels reach to: more than rounding moves them.
 const MARGIN: i32 = 1 << 10;
 
 /// A strip's blocks, in caller's memory.
@@ -140,6 +140,8 @@ pub struct Plan<'m> {
     pub last: [i32; 2],
     /// The strip it is about; none: nothing yet.
     pub strip: Option<u32>,
+    /// How far around a position pixels are told from, Q16 texels.
+    pub reach: i32,
     /// The row of the strip at which the edges stand.
     pub row: u32,
     /// Pixels of a row in cells of one sheet.
@@ -206,12 +208,12 @@ impl Site<'_, '_, '_> {
 }
 
 impl Plan<'_> {
-    /// Plans strip `strip` of the screen.
+    /// Plans strip `strip` of the screen, for pixels that are told from as far as `reach` around a position.
     #[inline(never)]
-    pub fn make(&mut self, site: &Site<'_, '_, '_>, strip: u32) {
+    pub fn make(&mut self, site: &Site<'_, '_, '_>, strip: u32, reach: i32) {
         (self.edges, self.runs, self.mixes) = (0, 0, 0);
         (self.smooth, self.torn, self.tests) = (0, 0, 0);
-        (self.strip, self.row) = (Some(strip), 0);
+        (self.strip, self.row, self.reach) = (Some(strip), 0, reach);
         let texture = site.bundle.texture();
         let window = Window::new(texture.width_log2, texture.height);
         let (log2, width) = (site.log2(), site.bundle.size().0);
@@ -288,16 +290,17 @@ impl Plan<'_> {
         let Some(edges) = self.edge.get_mut(self.edges..) else { return 0 };
         let window = Window { width_log2: 9, rows_log2: 5 };
         let row = u32::from(run.row);
-        let least = (row as i32).wrapping_shl(16).wrapping_add(MARGIN);
+        let margin = MARGIN.wrapping_add(self.reach);
+        let least = (row as i32).wrapping_shl(16).wrapping_add(margin);
         let [across, down] = [window.width_log2, window.rows_log2].map(|log2| 1u32.wrapping_shl(log2.wrapping_add(16)));
-        let [wide, high] = [across, down].map(|size| size.wrapping_sub((2 * MARGIN) as u32));
+        let [wide, high] = [across, down].map(|size| size.wrapping_sub(margin.wrapping_mul(2) as u32));
         let [mut from, mut to] = self.last;
         let mut done = 0usize;
         for ((edge, a), b) in edges.iter_mut().zip(above).zip(below).take(most.wrapping_mul(2)) {
             let (a, b) = (a.uv(), b.uv());
             // As in `append`: steps across of less than half the width, which is a power of two.
             let [near, far] = [a.u.wrapping_sub(from), b.u.wrapping_sub(to)].map(|step| step.wrapping_add((across >> 1) as i32) as u32);
-            let inside = (a.u.wrapping_sub(MARGIN) as u32) < wide && (b.u.wrapping_sub(MARGIN) as u32) < wide && (near | far) < across;
+            let inside = (a.u.wrapping_sub(margin) as u32) < wide && (b.u.wrapping_sub(margin) as u32) < wide && (near | far) < across;
             if !(inside && (a.v.wrapping_sub(least) as u32) < high && (b.v.wrapping_sub(least) as u32) < high) {
                 break;
             }
@@ -333,7 +336,8 @@ impl Plan<'_> {
         let (block, log2, height) = (across.block as u16, across.log2, across.site.texture.height);
         let [a, b, c, d] = corners;
         let width = 1i32.wrapping_shl(window.width_log2.wrapping_add(16));
-        let inside = |x: i32, limit: i32| (x.wrapping_sub(MARGIN) as u32) < limit.wrapping_sub(2 * MARGIN) as u32;
+        let margin = MARGIN.wrapping_add(self.reach);
+        let inside = |x: i32, limit: i32| (x.wrapping_sub(margin) as u32) < limit.wrapping_sub(margin.wrapping_mul(2)) as u32;
         // Steps across are told from differences of less than half the width.
         let near = |from: i32, to: i32| (to.wrapping_sub(from).wrapping_add(width >> 1) as u32) < width as u32;
         if !(inside(b.u, width) && inside(d.u, width) && near(a.u, b.u) && near(c.u, d.u)) {
@@ -362,9 +366,9 @@ impl Plan<'_> {
         let (low, high) = (a.v.min(b.v).min(c.v.min(d.v)), a.v.max(b.v).max(c.v.max(d.v)));
         let onwards = b.v.wrapping_add(d.v) >= a.v.wrapping_add(c.v);
         let row = if onwards {
-            low.wrapping_sub(MARGIN) >> 16
+            low.wrapping_sub(margin) >> 16
         } else {
-            (high.wrapping_add(MARGIN) >> 16).wrapping_add(1).wrapping_sub(1i32.wrapping_shl(window.rows_log2))
+            (high.wrapping_add(margin) >> 16).wrapping_add(1).wrapping_sub(1i32.wrapping_shl(window.rows_log2))
         };
         let row = row.min(height.wrapping_sub(1u32.wrapping_shl(window.rows_log2)) as i32).max(0) as u16;
         if ![a, b, c, d].into_iter().all(|uv| within(row, uv)) {

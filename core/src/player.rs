@@ -112,6 +112,26 @@ impl<'a, T: Texels> Player<'a, T> {
         T::smooth_row(&mut self.playing, y, out);
     }
 
+    /// Like [`Player::row`], with texels dithered: positions are moved by up to 3/8 of a texel, in a pattern of two by two pixels, which from some
+    /// way off looks as [`Player::bilinear_row`] does. An instruction a pixel more than `row`.
+    #[inline]
+    pub fn dithered_row(&mut self, y: u32, out: &mut [u16]) {
+        T::dithered_row(&mut self.playing, y, out);
+    }
+
+    /// Like [`Player::row`], every pixel a mean of the four texels around its position, weighted by how close they are. Four texel reads a pixel
+    /// instead of one.
+    #[inline]
+    pub fn bilinear_row(&mut self, y: u32, out: &mut [u16]) {
+        T::bilinear_row(&mut self.playing, y, out);
+    }
+
+    /// [`Player::bilinear_row`] with [`Player::smooth_row`]'s outlines: the best there is.
+    #[inline]
+    pub fn fine_row(&mut self, y: u32, out: &mut [u16]) {
+        T::fine_row(&mut self.playing, y, out);
+    }
+
     /// Like [`Player::row`], but says where each pixel comes from instead of its colour.
     #[inline]
     pub fn probe_row(&mut self, y: u32, out: &mut [Probe]) {

@@ -161,6 +161,11 @@ impl<'a> Playing<'a> {
         }
     }
 
+    /// Whether pixels' bytes are in the other order than the machine's.
+    pub fn swapped(&self) -> bool {
+        self.swapped
+    }
+
     /// Makes `frame` the current frame, and decodes the next key as far as it is due.
     pub fn seek(&mut self, frame: Frame) {
         let frames = self.bundle.frames();

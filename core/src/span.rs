@@ -53,12 +53,13 @@ impl<const WIDTH: u32, const ROWS: u32> Packed<WIDTH, ROWS> {
     }
 }
 
-/// Paints `out`, a run's blocks of `PIXELS` pixels each, and steps its edges down a row.
+/// Paints `out`, a run's blocks of `PIXELS` pixels each, and steps its edges down a row. `make` turns a position into a pixel, given the pixel's
+/// place in its block.
 #[inline(always)]
 pub fn run<T, const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(
     edges: &mut [Edge],
     out: &mut [T],
-    make: impl Fn(Packed<WIDTH, ROWS>) -> T,
+    make: impl Fn(Packed<WIDTH, ROWS>, usize) -> T,
 ) {
     let mut edges = edges.iter_mut();
     let Some(mut left) = edges.next().map(Edge::advance) else { return };
@@ -66,8 +67,8 @@ pub fn run<T, const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(
         let right = edge.advance();
         let step = Packed::<WIDTH, ROWS>::step(left, right, PIXELS.trailing_zeros());
         let Packed(mut at) = Packed::<WIDTH, ROWS>::new(left);
-        for pixel in pixels {
-            *pixel = make(Packed(at));
+        for (x, pixel) in pixels.iter_mut().enumerate() {
+            *pixel = make(Packed(at), x);
             at = at.wrapping_add(step);
         }
         left = right;
@@ -80,7 +81,7 @@ pub fn any_run<T, const WIDTH: u32, const ROWS: u32>(
     edges: &mut [Edge],
     out: &mut [T],
     log2: u32,
-    make: impl Fn(Packed<WIDTH, ROWS>) -> T,
+    make: impl Fn(Packed<WIDTH, ROWS>, usize) -> T,
 ) {
     let mut edges = edges.iter_mut();
     let Some(mut left) = edges.next().map(Edge::advance) else { return };
@@ -96,8 +97,8 @@ pub fn any_run<T, const WIDTH: u32, const ROWS: u32>(
             let (four, rest) = pixels.split_at_mut(pixels.len().min(4));
             pixels = rest;
             let Packed(mut at) = Packed::<WIDTH, ROWS>::new(left);
-            for pixel in four {
-                *pixel = make(Packed(at));
+            for (x, pixel) in four.iter_mut().enumerate() {
+                *pixel = make(Packed(at), x);
                 at = at.wrapping_add(step);
             }
             left = [left[0].wrapping_add((u as u32).wrapping_shl(2)), left[1].wrapping_add((v as u32).wrapping_shl(2))];
@@ -170,15 +171,16 @@ impl PlayUv {
     }
 }
 
-/// Paints the pixels of `out` that `shown` names, a bit each; `make` turns a position into a pixel. Positions outside the picture count as its edge.
+/// Paints the pixels of `out` that `shown` names, a bit each; `make` turns a position into a pixel, given its place in `out`. Positions outside the
+/// picture count as its edge.
 #[inline(always)]
-pub fn paint<T>(out: &mut [T], mut shown: u32, span: Span, texture: &Texture<'_>, make: impl Fn(PlayUv) -> T) {
+pub fn paint<T>(out: &mut [T], mut shown: u32, span: Span, texture: &Texture<'_>, make: impl Fn(PlayUv, usize) -> T) {
     let mut uv = span.from;
     // A span is straight: if both its ends are inside, all of it is.
     let inside = texture.holds(uv) && texture.holds(span.at(out.len().wrapping_sub(1)));
-    for pixel in out {
+    for (x, pixel) in out.iter_mut().enumerate() {
         if shown & 1 != 0 {
-            *pixel = make(if inside { uv } else { texture.clamp(uv) });
+            *pixel = make(if inside { uv } else { texture.clamp(uv) }, x);
         }
         shown >>= 1;
         uv = uv.plus(span.step);

@@ -15,7 +15,8 @@
 use crate::Bundle;
 use crate::atlas::Texture;
 use crate::coder::Decoder;
-use crate::draw::{Paint, mean};
+use crate::draw::Paint;
+use crate::filter::{Bilinear, Dither, Filter, Nearest, mean};
 use crate::fixed::PlayUv;
 use crate::format::TexelKind;
 use crate::pack::{self, Picture, Scratch};
@@ -42,12 +43,21 @@ pub trait Source {
 
     /// Draws row `y` with antialiased outlines.
     fn smooth_row(playing: &mut Playing<'_>, y: u32, out: &mut [u16]);
+
+    /// Draws row `y`, texels dithered.
+    fn dithered_row(playing: &mut Playing<'_>, y: u32, out: &mut [u16]);
+
+    /// Draws row `y`, texels bilinear.
+    fn bilinear_row(playing: &mut Playing<'_>, y: u32, out: &mut [u16]);
+
+    /// Draws row `y` with antialiased outlines, texels bilinear.
+    fn fine_row(playing: &mut Playing<'_>, y: u32, out: &mut [u16]);
 }
 
 /// What sets kinds apart.
 trait Kind {
     /// What makes colours of positions.
-    type Colours<'t>: Paint<Pixel = u16>;
+    type Colours<'t>: Colours;
 
     /// Whether texels of `kind` are played.
     fn plays(kind: TexelKind) -> bool;
@@ -57,6 +67,24 @@ trait Kind {
 
     /// Unpacks texels of `kind`.
     fn unpack(kind: TexelKind, bits: &mut Decoder<'_>, scratch: Scratch<'_>, picture: &mut Picture<'_>);
+}
+
+/// Draws row `y`.
+#[inline(always)]
+fn row<K: Kind, F: Filter>(playing: &mut Playing<'_>, y: u32, out: &mut [u16], filter: F) {
+    let Some((mut drawing, work, look)) = playing.drawing(y) else { return };
+    let Some(colours) = K::colours(look) else { return };
+    drawing.row(y, out, work, &Lookup { colours, filter });
+}
+
+/// Draws row `y` with antialiased outlines.
+#[inline(always)]
+fn smooth<K: Kind, F: Filter>(playing: &mut Playing<'_>, y: u32, out: &mut [u16], filter: F) {
+    let Some((mut drawing, work, look)) = playing.drawing(y) else { return };
+    let swapped = look.swapped;
+    let Some(colours) = K::colours(look) else { return };
+    let native = |colour: u16| if swapped { colour.swap_bytes() } else { colour };
+    drawing.smooth(y, out, work, &Lookup { colours, filter }, |four| native(mean(four.map(native))));
 }
 
 // Said for each, not for all that are a `Kind`: that would be generic, and compiled with its callers instead of with all that it calls.
@@ -73,17 +101,31 @@ macro_rules! sources {
             }
 
             fn row(playing: &mut Playing<'_>, y: u32, out: &mut [u16]) {
-                let Some((mut drawing, work, look)) = playing.drawing(y) else { return };
-                let Some(colours) = <$kind>::colours(look) else { return };
-                drawing.row(y, out, work, &colours);
+                row::<Self, _>(playing, y, out, Nearest);
             }
 
             fn smooth_row(playing: &mut Playing<'_>, y: u32, out: &mut [u16]) {
-                let Some((mut drawing, work, look)) = playing.drawing(y) else { return };
-                let swapped = look.swapped;
-                let Some(colours) = <$kind>::colours(look) else { return };
-                let native = |colour: u16| if swapped { colour.swap_bytes() } else { colour };
-                drawing.smooth(y, out, work, &colours, |four| native(mean(four.map(native))));
+                smooth::<Self, _>(playing, y, out, Nearest);
+            }
+
+            fn dithered_row(playing: &mut Playing<'_>, y: u32, out: &mut [u16]) {
+                row::<Self, _>(playing, y, out, Dither::new(y));
+            }
+
+            fn bilinear_row(playing: &mut Playing<'_>, y: u32, out: &mut [u16]) {
+                if playing.swapped() {
+                    row::<Self, _>(playing, y, out, Bilinear::<true>);
+                } else {
+                    row::<Self, _>(playing, y, out, Bilinear::<false>);
+                }
+            }
+
+            fn fine_row(playing: &mut Playing<'_>, y: u32, out: &mut [u16]) {
+                if playing.swapped() {
+                    smooth::<Self, _>(playing, y, out, Bilinear::<true>);
+                } else {
+                    smooth::<Self, _>(playing, y, out, Bilinear::<false>);
+                }
             }
         }
     )*};
@@ -107,6 +149,47 @@ pub struct Direct565;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct AnyTexels;
 
+/// What makes colours of texels.
+trait Colours {
+    /// The source image.
+    fn texture(&self) -> &Texture<'_>;
+
+    /// The colour of the picture's texel `index`; black past the last.
+    fn colour(&self, index: usize) -> u16;
+
+    /// A run's pixels, as [`Paint::run`] has them.
+    fn run<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
+        &self,
+        filter: F,
+        run: Run,
+        edges: &mut [Edge],
+        out: &mut [u16],
+        log2: u32,
+    );
+}
+
+/// Colours looked up by way of a filter.
+struct Lookup<C, F> {
+    colours: C,
+    filter: F,
+}
+
+impl<C: Colours, F: Filter> Paint for Lookup<C, F> {
+    type Pixel = u16;
+    const OFTEN: bool = true;
+    const REACH: i32 = F::REACH;
+
+    #[inline(always)]
+    fn at(&self, uv: PlayUv, _: u8, x: usize) -> u16 {
+        self.filter.at(uv, x, self.colours.texture(), |index| self.colours.colour(index))
+    }
+
+    #[inline(always)]
+    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [u16], log2: u32) {
+        self.colours.run::<F, WIDTH, ROWS, TEXELS>(self.filter, run, edges, out, log2);
+    }
+}
+
 /// Colours of a byte a texel.
 #[derive(Debug)]
 pub struct Colours8<'t> {
@@ -116,34 +199,48 @@ pub struct Colours8<'t> {
 
 impl Colours8<'_> {
     #[inline(always)]
-    fn colour(&self, texel: u8) -> u16 {
+    fn entry(&self, texel: u8) -> u16 {
         self.palette.get(usize::from(texel)).copied().unwrap_or(0)
     }
 }
 
-impl Paint for Colours8<'_> {
-    type Pixel = u16;
-    const OFTEN: bool = true;
+impl Colours for Colours8<'_> {
+    fn texture(&self) -> &Texture<'_> {
+        &self.texture
+    }
 
     #[inline(always)]
-    fn at(&self, uv: PlayUv, _: u8) -> u16 {
-        self.colour(self.texture.texels.get(self.texture.index(uv)).copied().unwrap_or(0))
+    fn colour(&self, index: usize) -> u16 {
+        self.entry(self.texture.texels.get(index).copied().unwrap_or(0))
     }
 
     // A function of its own: the loop needs all registers.
     #[inline(never)]
-    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [u16], log2: u32) {
+    fn run<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
+        &self,
+        filter: F,
+        run: Run,
+        edges: &mut [Edge],
+        out: &mut [u16],
+        log2: u32,
+    ) {
         let from = usize::from(run.row).wrapping_shl(WIDTH);
         // The plan keeps windows inside the picture.
         let Some(window) = self.texture.texels.get(from..).and_then(<[u8]>::first_chunk::<TEXELS>) else { return };
-        let make = |at: Packed<WIDTH, ROWS>| self.colour(window.get(at.texel()).copied().unwrap_or(0));
-        paint_run(edges, out, log2, make);
+        paint_run::<_, WIDTH, ROWS>(filter, edges, out, log2, |index| self.entry(window.get(index & (TEXELS - 1)).copied().unwrap_or(0)));
     }
 }
 
-/// A run's pixels.
+/// A run's pixels, of colours of a window's texels.
 #[inline(always)]
-fn paint_run<const WIDTH: u32, const ROWS: u32>(edges: &mut [Edge], out: &mut [u16], log2: u32, make: impl Fn(Packed<WIDTH, ROWS>) -> u16) {
+fn paint_run<F: Filter, const WIDTH: u32, const ROWS: u32>(
+    filter: F,
+    edges: &mut [Edge],
+    out: &mut [u16],
+    log2: u32,
+    colour: impl Fn(usize) -> u16,
+) {
+    let make = |at: Packed<WIDTH, ROWS>, x: usize| filter.packed(at, x, &colour);
     // Blocks of four in a picture 512 wide are the rule, and have a loop of their own.
     if (WIDTH, log2) == (9, 2) {
         span::run::<_, WIDTH, ROWS, 4>(edges, out, make);
@@ -179,7 +276,7 @@ pub struct Colours4<'t> {
 impl Colours4<'_> {
     /// The colour of texel `index` of those that `texels` holds two in a byte; black past their end.
     #[inline(always)]
-    fn colour(&self, texels: &[u8], index: usize) -> u16 {
+    fn entry(&self, texels: &[u8], index: usize) -> u16 {
         let two = texels.get(index >> 1).copied().unwrap_or(0);
         let texel = two >> ((index & 1) << 2) & 15;
         self.palette.get(usize::from(texel)).copied().unwrap_or(0)
@@ -187,28 +284,43 @@ impl Colours4<'_> {
 
     /// A run in a window of `BYTES` bytes.
     #[inline(always)]
-    fn window<const WIDTH: u32, const ROWS: u32, const BYTES: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [u16], log2: u32) {
+    fn window<F: Filter, const WIDTH: u32, const ROWS: u32, const BYTES: usize>(
+        &self,
+        filter: F,
+        run: Run,
+        edges: &mut [Edge],
+        out: &mut [u16],
+        log2: u32,
+    ) {
         let from = usize::from(run.row).wrapping_shl(WIDTH) >> 1;
         let Some(window) = self.texture.texels.get(from..).and_then(<[u8]>::first_chunk::<BYTES>) else { return };
-        paint_run(edges, out, log2, |at: Packed<WIDTH, ROWS>| self.colour(window, at.texel()));
+        paint_run::<_, WIDTH, ROWS>(filter, edges, out, log2, |index| self.entry(window, index & (2 * BYTES - 1)));
     }
 }
 
-impl Paint for Colours4<'_> {
-    type Pixel = u16;
-    const OFTEN: bool = true;
+impl Colours for Colours4<'_> {
+    fn texture(&self) -> &Texture<'_> {
+        &self.texture
+    }
 
     #[inline(always)]
-    fn at(&self, uv: PlayUv, _: u8) -> u16 {
-        self.colour(self.texture.texels, self.texture.index(uv))
+    fn colour(&self, index: usize) -> u16 {
+        self.entry(self.texture.texels, index)
     }
 
     #[inline(never)]
-    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [u16], log2: u32) {
+    fn run<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
+        &self,
+        filter: F,
+        run: Run,
+        edges: &mut [Edge],
+        out: &mut [u16],
+        log2: u32,
+    ) {
         // Half of TEXELS, which is one of two numbers.
         match TEXELS {
-            0x2000 => self.window::<WIDTH, ROWS, 0x1000>(run, edges, out, log2),
-            _ => self.window::<WIDTH, ROWS, 0x2000>(run, edges, out, log2),
+            0x2000 => self.window::<_, WIDTH, ROWS, 0x1000>(filter, run, edges, out, log2),
+            _ => self.window::<_, WIDTH, ROWS, 0x2000>(filter, run, edges, out, log2),
         }
     }
 }
@@ -244,26 +356,34 @@ fn pixel<const SWAPPED: bool>(texel: Option<&[u8; 2]>) -> u16 {
     if SWAPPED { colour.swap_bytes() } else { colour }
 }
 
-impl Paint for ColoursDirect<'_> {
-    type Pixel = u16;
-    const OFTEN: bool = true;
+impl Colours for ColoursDirect<'_> {
+    fn texture(&self) -> &Texture<'_> {
+        &self.texture
+    }
 
     #[inline(always)]
-    fn at(&self, uv: PlayUv, _: u8) -> u16 {
-        let texel = self.texture.texels.as_chunks().0.get(self.texture.index(uv));
+    fn colour(&self, index: usize) -> u16 {
+        let texel = self.texture.texels.as_chunks().0.get(index);
         if self.swapped { pixel::<true>(texel) } else { pixel::<false>(texel) }
     }
 
     #[inline(never)]
-    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [u16], log2: u32) {
+    fn run<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
+        &self,
+        filter: F,
+        run: Run,
+        edges: &mut [Edge],
+        out: &mut [u16],
+        log2: u32,
+    ) {
         let from = usize::from(run.row).wrapping_shl(WIDTH);
         let texels = self.texture.texels.as_chunks::<2>().0;
         let Some(window) = texels.get(from..).and_then(<[[u8; 2]]>::first_chunk::<TEXELS>) else { return };
         // A loop for either order of bytes.
         if self.swapped {
-            paint_run(edges, out, log2, |at: Packed<WIDTH, ROWS>| pixel::<true>(window.get(at.texel())));
+            paint_run::<_, WIDTH, ROWS>(filter, edges, out, log2, |index| pixel::<true>(window.get(index & (TEXELS - 1))));
         } else {
-            paint_run(edges, out, log2, |at: Packed<WIDTH, ROWS>| pixel::<false>(window.get(at.texel())));
+            paint_run::<_, WIDTH, ROWS>(filter, edges, out, log2, |index| pixel::<false>(window.get(index & (TEXELS - 1))));
         }
     }
 }
@@ -296,24 +416,36 @@ pub enum AnyColours<'t> {
     Direct(ColoursDirect<'t>),
 }
 
-impl Paint for AnyColours<'_> {
-    type Pixel = u16;
-    const OFTEN: bool = true;
-
-    #[inline(always)]
-    fn at(&self, uv: PlayUv, label: u8) -> u16 {
+impl Colours for AnyColours<'_> {
+    fn texture(&self) -> &Texture<'_> {
         match self {
-            Self::Eight(colours) => colours.at(uv, label),
-            Self::Four(colours) => colours.at(uv, label),
-            Self::Direct(colours) => colours.at(uv, label),
+            Self::Eight(colours) => colours.texture(),
+            Self::Four(colours) => colours.texture(),
+            Self::Direct(colours) => colours.texture(),
         }
     }
 
-    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [u16], log2: u32) {
+    #[inline(always)]
+    fn colour(&self, index: usize) -> u16 {
         match self {
-            Self::Eight(colours) => colours.run::<WIDTH, ROWS, TEXELS>(run, edges, out, log2),
-            Self::Four(colours) => colours.run::<WIDTH, ROWS, TEXELS>(run, edges, out, log2),
-            Self::Direct(colours) => colours.run::<WIDTH, ROWS, TEXELS>(run, edges, out, log2),
+            Self::Eight(colours) => colours.colour(index),
+            Self::Four(colours) => colours.colour(index),
+            Self::Direct(colours) => colours.colour(index),
+        }
+    }
+
+    fn run<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
+        &self,
+        filter: F,
+        run: Run,
+        edges: &mut [Edge],
+        out: &mut [u16],
+        log2: u32,
+    ) {
+        match self {
+            Self::Eight(colours) => colours.run::<F, WIDTH, ROWS, TEXELS>(filter, run, edges, out, log2),
+            Self::Four(colours) => colours.run::<F, WIDTH, ROWS, TEXELS>(filter, run, edges, out, log2),
+            Self::Direct(colours) => colours.run::<F, WIDTH, ROWS, TEXELS>(filter, run, edges, out, log2),
         }
     }
 }

@@ -1,7 +1,8 @@
 //! The command line: what may be typed, and what it means.
 //! Arguments come in; checked options go to `input`, `window`, `headless`, `render` and `measure`.
 
-use clap::{Args, Parser, Subcommand};
+use crate::picture::Draw;
+use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -88,6 +89,34 @@ pub struct Render {
     /// Antialiases outlines: four samples a pixel where surfaces meet, as the player's `smooth_row` does; such pixels take four times as long.
     #[arg(long)]
     pub smooth: bool,
+    /// How texels become pixels [default: nearest].
+    #[arg(long, value_name = "KIND", value_enum, default_value_t, hide_default_value = true)]
+    pub texels: Texels,
+}
+
+/// How texels become pixels.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum Texels {
+    /// The one that a pixel falls into: `row`
+    #[default]
+    Nearest,
+    /// One of those around it, in a pattern of two by two pixels: `dithered_row`; not with --smooth
+    Dithered,
+    /// The mean of the four around it: `bilinear_row`, and `fine_row` with --smooth
+    Bilinear,
+}
+
+impl Render {
+    /// How the player draws a row.
+    pub fn draw(&self) -> Draw {
+        match (self.texels, self.smooth) {
+            (Texels::Nearest, false) => |player, y, row| player.row(y, row),
+            (Texels::Nearest, true) => |player, y, row| player.smooth_row(y, row),
+            (Texels::Dithered, _) => |player, y, row| player.dithered_row(y, row),
+            (Texels::Bilinear, false) => |player, y, row| player.bilinear_row(y, row),
+            (Texels::Bilinear, true) => |player, y, row| player.fine_row(y, row),
+        }
+    }
 }
 
 const RENDER_EXAMPLES: &str = "\

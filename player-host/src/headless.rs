@@ -15,8 +15,14 @@ use std::time::Duration;
 pub fn pictures(player: &mut Player<'_>, folder: &Path, limit: Option<u32>, scale: u32) -> Result<()> {
     let frames = player.bundle().frames();
     let gif = folder.join("demo.gif");
-    let plan =
-        Plan { frames: 0..limit.map_or(frames, |l| l.min(frames)), every: 1, out: Some(folder), gif: Some(&gif), scale, smooth: false };
+    let plan = Plan {
+        frames: 0..limit.map_or(frames, |l| l.min(frames)),
+        every: 1,
+        out: Some(folder),
+        gif: Some(&gif),
+        scale,
+        draw: |player, y, row| player.row(y, row),
+    };
     render::write(player, &plan)
 }
 

@@ -7,35 +7,34 @@ use image::RgbImage;
 /// The desktop's player: of texels of every kind.
 pub type Player<'a> = cubist_core::Player<'a, AnyTexels>;
 
+/// One of the player's ways to draw a row.
+pub type Draw = fn(&mut Player<'_>, u32, &mut [u16]);
+
 /// Width x height RGB565 pixels, row 0 on top.
 pub struct Picture {
     width: u32,
     height: u32,
     pixels: Vec<u16>,
-    /// Outlines are antialiased.
-    smooth: bool,
+    /// How the player draws a row.
+    draw: Draw,
 }
 
 impl Picture {
     /// A black picture of `width` x `height` pixels.
     pub fn new(width: u32, height: u32) -> Self {
-        Self { width, height, pixels: vec![0; width as usize * height as usize], smooth: false }
+        Self { width, height, pixels: vec![0; width as usize * height as usize], draw: |player, y, row| player.row(y, row) }
     }
 
-    /// The same picture, with antialiased outlines from now on if `smooth`.
-    pub fn with_smooth_outlines(self, smooth: bool) -> Self {
-        Self { smooth, ..self }
+    /// The same picture, drawn in another way from now on.
+    pub fn drawn_by(self, draw: Draw) -> Self {
+        Self { draw, ..self }
     }
 
     /// Plays `frame` into the picture, which has the bundle's size; what that took comes back.
     pub fn play(&mut self, player: &mut Player<'_>, frame: u32) -> Work {
         player.seek(Frame(frame));
         for y in 0..self.height {
-            if self.smooth {
-                player.smooth_row(y, self.row_mut(y));
-            } else {
-                player.row(y, self.row_mut(y));
-            }
+            (self.draw)(player, y, self.row_mut(y));
         }
         player.work()
     }

@@ -1,10 +1,10 @@
 //! `cubist-player render`: frames as PNG files and as a GIF.
 //! A player comes in; files go out through `files`, so that each is whole or not there.
 
-use crate::cli::{Render, Usage};
+use crate::cli::{Render, Texels, Usage};
 use crate::files::write_png;
 use crate::input::print;
-use crate::picture::{Picture, Player};
+use crate::picture::{Draw, Picture, Player};
 use crate::progress::progress;
 use anyhow::{Context, Result};
 use cubist_baker::files::{same, write_with};
@@ -25,8 +25,8 @@ pub struct Plan<'p> {
     pub gif: Option<&'p Path>,
     /// Every pixel becomes a square of this side.
     pub scale: u32,
-    /// Outlines are antialiased.
-    pub smooth: bool,
+    /// How the player draws a row.
+    pub draw: Draw,
 }
 
 /// Runs the command.
@@ -37,8 +37,11 @@ pub fn run(player: &mut Player<'_>, args: &Render) -> Result<()> {
         out: args.out.as_deref(),
         gif: args.gif.as_deref(),
         scale: args.scale,
-        smooth: args.smooth,
+        draw: args.draw(),
     };
+    if args.smooth && args.texels == Texels::Dithered {
+        return Err(Usage("--smooth and --texels dithered: there are no such rows; take --texels nearest or bilinear".to_owned()).into());
+    }
     if let Some(gif) = plan.gif
         && same(gif, &args.bundle)
     {
@@ -58,7 +61,7 @@ pub fn write(player: &mut Player<'_>, plan: &Plan<'_>) -> Result<()> {
             Usage(format!("--scale {} makes {} x {} pixels; a GIF holds at most 65535 a side", plan.scale, sides.0, sides.1)).into()
         );
     }
-    let mut picture = Picture::new(width, height).with_smooth_outlines(plan.smooth);
+    let mut picture = Picture::new(width, height).drawn_by(plan.draw);
     if let Some(folder) = plan.out {
         std::fs::create_dir_all(folder).with_context(|| format!("{}: the folder cannot be made", folder.display()))?;
         let bar = progress(frames.len() as u64, "pictures");

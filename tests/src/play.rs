@@ -64,12 +64,15 @@ pub fn frames(bytes: &[u8], frames: impl IntoIterator<Item = u32>) -> Result<Vec
     Ok(pictures)
 }
 
-/// Frames of `bytes` as a player of `T` draws them, every row plain and antialiased, from memory filled with `fill`; a row is shorter than the
+/// One of a player's ways to draw a row.
+type Way<'a, T> = fn(&mut Player<'a, T>, u32, &mut [u16]);
+
+/// Frames of `bytes` as a player of `T` draws them, every row in all the ways there are, from memory filled with `fill`; a row is shorter than the
 /// screen.
 ///
 /// # Errors
 /// The bundle does not parse, or has texels of another kind.
-pub fn both_ways<T: Texels>(bytes: &[u8], frames: &[u32], fill: u8, order: ByteOrder) -> Result<Vec<u16>> {
+pub fn every_way<T: Texels>(bytes: &[u8], frames: &[u32], fill: u8, order: ByteOrder) -> Result<Vec<u16>> {
     let bundle = Bundle::parse(bytes)?;
     let (width, height) = bundle.size();
     let mut memory = vec![fill; bundle.memory_needed()];
@@ -80,10 +83,11 @@ pub fn both_ways<T: Texels>(bytes: &[u8], frames: &[u32], fill: u8, order: ByteO
         player.seek(Frame(frame));
         for y in 0..height {
             let mut row = vec![0; (if y == 7 { width * 3 / 5 } else { width }) as usize];
-            player.row(y, &mut row);
-            out.extend(&row);
-            player.smooth_row(y, &mut row);
-            out.extend(&row);
+            let ways: [Way<'_, T>; 5] = [Player::row, Player::smooth_row, Player::dithered_row, Player::bilinear_row, Player::fine_row];
+            for way in ways {
+                way(&mut player, y, &mut row);
+                out.extend(&row);
+            }
         }
     }
     Ok(out)

@@ -33,7 +33,7 @@ fn bytes_of(flat: &Flat) -> Vec<u8> {
 
 /// Some frames, plain and antialiased, from memory filled with `fill`.
 fn pixels(bytes: &[u8], fill: u8) -> Vec<u16> {
-    play::both_ways::<Indexed8>(bytes, &[0, 5, 6, 11, 2], fill, ByteOrder::Native).expect("sound, and the memory it asked for")
+    play::every_way::<Indexed8>(bytes, &[0, 5, 6, 11, 2], fill, ByteOrder::Native).expect("sound, and the memory it asked for")
 }
 
 #[test]

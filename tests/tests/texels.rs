@@ -54,7 +54,7 @@ fn retold(four: &[u8]) -> [Vec<u8>; 2] {
 
 /// Some frames as a player of `T` draws them, plain and antialiased, from memory filled with `fill`.
 fn pixels<T: Texels>(bytes: &[u8], fill: u8, order: ByteOrder) -> Vec<u16> {
-    play::both_ways::<T>(bytes, &[0, 5, 6, 11, 2], fill, order).expect("sound, and the memory it asked for")
+    play::every_way::<T>(bytes, &[0, 5, 6, 11, 2], fill, order).expect("sound, and the memory it asked for")
 }
 
 #[test]

@@ -37,7 +37,7 @@ pub fn measure(scene: &Scene) -> Result<Value> {
     let truth = Truth::new(scene);
     let frames = spread(scene.playback.frames, COMPARED);
     let (width, pixels) = (scene.playback.width as usize, scene.playback.width as usize * scene.playback.height as usize);
-    let (mut plain, mut smooth, mut smoothed) = (Drawn::default(), Drawn::default(), 0u64);
+    let (mut ways, mut smoothed): ([Drawn; 5], u64) = Default::default();
     play::visit(&encoded.bundle, frames.iter().copied(), |frame, player| {
         let exact = truth.frame(frame);
         let draw = |drawn: &mut Drawn, player: &mut Player<'_>, row: fn(&mut Player<'_>, u32, &mut [u16])| {
@@ -48,19 +48,30 @@ pub fn measure(scene: &Scene) -> Result<Value> {
             drawn.psnr += metrics::psnr(metrics::mean_squared_error(&played, &exact));
             drawn.ssim += metrics::ssim(&played, &exact, width);
         };
-        draw(&mut plain, player, |player, y, out| player.row(y, out));
-        draw(&mut smooth, player, |player, y, out| player.smooth_row(y, out));
+        let [plain, smooth, dithered, bilinear, fine] = &mut ways;
+        draw(plain, player, |player, y, out| player.row(y, out));
+        draw(dithered, player, |player, y, out| player.dithered_row(y, out));
+        draw(bilinear, player, |player, y, out| player.bilinear_row(y, out));
+        draw(smooth, player, |player, y, out| player.smooth_row(y, out));
         smoothed += u64::from(player.work().smoothed_pixels);
+        draw(fine, player, |player, y, out| player.fine_row(y, out));
     })?;
+    let [plain, smooth, dithered, bilinear, fine] = &ways;
     let count = frames.len().max(1) as f64;
+    let time = |way: &Drawn| way.time.as_secs_f64() / plain.time.as_secs_f64().max(1e-9);
     Ok(json!({
         "scene": scene.name,
         "truth_psnr": plain.psnr / count,
         "truth_psnr_smooth": smooth.psnr / count,
+        "truth_psnr_dithered": dithered.psnr / count,
+        "truth_psnr_bilinear": bilinear.psnr / count,
+        "truth_psnr_fine": fine.psnr / count,
         "truth_ssim": plain.ssim / count,
         "truth_ssim_smooth": smooth.ssim / count,
+        "truth_ssim_fine": fine.ssim / count,
         "smoothed_percent": 100.0 * smoothed as f64 / (count * pixels as f64),
-        "time_ratio": smooth.time.as_secs_f64() / plain.time.as_secs_f64().max(1e-9),
+        "time_ratio": time(smooth),
+        "time_ratio_fine": time(fine),
     }))
 }
 
@@ -70,16 +81,22 @@ pub fn table(rows: Vec<Value>) -> Table {
     let columns = [
         ("truth_psnr", 2),
         ("truth_psnr_smooth", 2),
+        ("truth_psnr_dithered", 2),
+        ("truth_psnr_bilinear", 2),
+        ("truth_psnr_fine", 2),
         ("truth_ssim", 3),
         ("truth_ssim_smooth", 3),
+        ("truth_ssim_fine", 3),
         ("smoothed_percent", 1),
         ("time_ratio", 2),
+        ("time_ratio_fine", 2),
     ];
     let cells = |row: &Value| {
         let numbers = columns.iter().map(|&(key, digits)| number(&row[key], digits));
         std::iter::once(row["scene"].as_str().unwrap_or_default().to_owned()).chain(numbers).collect()
     };
     let lines: Vec<Vec<String>> = rows.iter().map(cells).collect();
-    let titles = ["scene", "PSNR", "PSNR smooth", "SSIM", "SSIM smooth", "smoothed %", "host time, times"];
+    let titles =
+        ["scene", "PSNR", "smooth", "dithered", "bilinear", "fine", "SSIM", "smooth", "fine", "smoothed %", "host time, smooth", "fine"];
     Table { markdown: markdown(&titles, 1, &lines), json: Value::from(rows) }
 }
