@@ -41,7 +41,7 @@ impl Paint for Probes {
 
     fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [Probe], log2: u32) {
         let label = run.label as u8;
-        span::any_run(edges, out, log2, |at: Packed<WIDTH, ROWS>, _| Probe { label, at: at.at(run.row) });
+        span::any_run(edges, out, log2, [0; 2], |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(run.row) });
     }
 }
 

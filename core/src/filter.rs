@@ -10,8 +10,12 @@ pub trait Filter: Copy {
     /// How far it reaches beyond a position, Q16 texels.
     const REACH: i32;
 
-    /// The pixel at `at` in a window of 2^ROWS rows of 2^WIDTH texels; `x`: whether it is an odd one of its row.
-    fn packed<const WIDTH: u32, const ROWS: u32>(self, at: Packed<WIDTH, ROWS>, x: usize, colour: impl Fn(usize) -> u16) -> u16;
+    /// What is added to positions packed into windows 2^`width_log2` texels wide before [`Filter::packed`] gets them, at even and at odd pixels of a
+    /// row.
+    fn offsets(self, width_log2: u32) -> [u32; 2];
+
+    /// The pixel at `at`, which has its offset, in a window of 2^ROWS rows of 2^WIDTH texels.
+    fn packed<const WIDTH: u32, const ROWS: u32>(self, at: Packed<WIDTH, ROWS>, colour: impl Fn(usize) -> u16) -> u16;
 
     /// The pixel at `uv`, which is inside the picture.
     fn at(self, uv: PlayUv, x: usize, texture: &Texture<'_>, colour: impl Fn(usize) -> u16) -> u16;
@@ -25,7 +29,12 @@ impl Filter for Nearest {
     const REACH: i32 = 0;
 
     #[inline(always)]
-    fn packed<const WIDTH: u32, const ROWS: u32>(self, at: Packed<WIDTH, ROWS>, _: usize, colour: impl Fn(usize) -> u16) -> u16 {
+    fn offsets(self, _: u32) -> [u32; 2] {
+        [0; 2]
+    }
+
+    #[inline(always)]
+    fn packed<const WIDTH: u32, const ROWS: u32>(self, at: Packed<WIDTH, ROWS>, colour: impl Fn(usize) -> u16) -> u16 {
         colour(at.texel())
     }
 
@@ -61,10 +70,16 @@ impl Filter for Dither {
     const REACH: i32 = 3 << (PLAY_BITS - 3);
 
     #[inline(always)]
-    fn packed<const WIDTH: u32, const ROWS: u32>(self, at: Packed<WIDTH, ROWS>, x: usize, colour: impl Fn(usize) -> u16) -> u16 {
-        let [u, v] = self.of(x);
-        let moved = u.wrapping_shl(29u32.wrapping_sub(WIDTH)).wrapping_add(v.wrapping_shl(WIDTH.wrapping_sub(3)));
-        colour(Packed::<WIDTH, ROWS>(at.0.wrapping_add(moved as u32)).texel())
+    fn offsets(self, width_log2: u32) -> [u32; 2] {
+        self.eighths.map(|[u, v]| {
+            let (across, down) = (u.wrapping_shl(29u32.wrapping_sub(width_log2)), v.wrapping_shl(width_log2.wrapping_sub(3)));
+            across.wrapping_add(down) as u32
+        })
+    }
+
+    #[inline(always)]
+    fn packed<const WIDTH: u32, const ROWS: u32>(self, at: Packed<WIDTH, ROWS>, colour: impl Fn(usize) -> u16) -> u16 {
+        colour(at.texel())
     }
 
     #[inline(always)]
@@ -105,12 +120,17 @@ impl<const SWAPPED: bool> Filter for Bilinear<SWAPPED> {
     const REACH: i32 = 1 << (PLAY_BITS - 1);
 
     #[inline(always)]
-    fn packed<const WIDTH: u32, const ROWS: u32>(self, at: Packed<WIDTH, ROWS>, _: usize, colour: impl Fn(usize) -> u16) -> u16 {
+    fn offsets(self, width_log2: u32) -> [u32; 2] {
         // From centre to centre; the window has room for half a texel all around.
-        let from = at.0.wrapping_sub(1u32.wrapping_shl(31u32.wrapping_sub(WIDTH)).wrapping_add(1u32.wrapping_shl(WIDTH.wrapping_sub(1))));
-        let share = |shift: u32| from.wrapping_shr(shift.wrapping_sub(SHARE_BITS)) & ((1 << SHARE_BITS) - 1);
+        let half = 1u32.wrapping_shl(31u32.wrapping_sub(width_log2)).wrapping_add(1u32.wrapping_shl(width_log2.wrapping_sub(1)));
+        [half.wrapping_neg(); 2]
+    }
+
+    #[inline(always)]
+    fn packed<const WIDTH: u32, const ROWS: u32>(self, at: Packed<WIDTH, ROWS>, colour: impl Fn(usize) -> u16) -> u16 {
+        let share = |shift: u32| at.0.wrapping_shr(shift.wrapping_sub(SHARE_BITS)) & ((1 << SHARE_BITS) - 1);
         let (across, down) = (share(32u32.wrapping_sub(WIDTH)), share(WIDTH));
-        let first = Packed::<WIDTH, ROWS>(from).texel();
+        let first = at.texel();
         let below = first.wrapping_add(1 << WIDTH);
         Self::mean([colour(first), colour(first.wrapping_add(1)), colour(below), colour(below.wrapping_add(1))], across, down)
     }
@@ -147,7 +167,7 @@ pub const fn mean([a, b, c, d]: [u16; 4]) -> u16 {
 
 #[cfg(test)]
 mod tests {
-    use super::{Bilinear, Dither, Filter, mean};
+    use super::{Bilinear, Dither, Filter, Nearest, mean};
     use crate::atlas::Texture;
     use crate::fixed::PlayUv;
     use crate::span::Packed;
@@ -198,10 +218,16 @@ mod tests {
         }
     }
 
+    /// Holds the pixel at `at` in a window against that at `uv`, the same position in a picture of the window's size.
+    fn same<F: Filter>(filter: F, at: Packed<9, 5>, uv: PlayUv, x: usize) {
+        let texture = Texture { texels: &[], mask: &[], width_log2: 9, height: 32 };
+        let colour = |index: usize| (index as u16).wrapping_mul(40_503);
+        let moved = Packed::<9, 5>(at.0.wrapping_add(filter.offsets(9)[x]));
+        assert_eq!(filter.packed(moved, colour), filter.at(uv, x, &texture, colour), "{uv:?}");
+    }
+
     #[test]
     fn a_position_gives_the_same_pixel_in_a_window_and_in_the_picture() {
-        let texture = Texture { texels: &[], mask: &[], width_log2: 9, height: 32 };
-        let get = |index: usize| (index as u16).wrapping_mul(40_503);
         let mut next = colours();
         for _ in 0..2000 {
             let [a, b, c] = next().map(u32::from);
@@ -211,9 +237,10 @@ mod tests {
             let at = Packed::<9, 5>(u << 14 | v);
             for x in 0..2 {
                 for y in 0..2 {
-                    assert_eq!(Dither::new(y).packed(at, x, get), Dither::new(y).at(uv, x, &texture, get));
+                    same(Dither::new(y), at, uv, x);
                 }
-                assert_eq!(Bilinear::<false>.packed(at, x, get), Bilinear::<false>.at(uv, x, &texture, get));
+                same(Bilinear::<false>, at, uv, x);
+                same(Nearest, at, uv, x);
             }
         }
     }

@@ -53,25 +53,40 @@ impl<const WIDTH: u32, const ROWS: u32> Packed<WIDTH, ROWS> {
     }
 }
 
-/// Paints `out`, a run's blocks of `PIXELS` pixels each, and steps its edges down a row. `make` turns a position into a pixel, given the pixel's
-/// place in its block.
+/// Paints `out`, a run's blocks of `PIXELS` pixels each, and steps its edges down a row. `make` turns a position into a pixel, once it is moved by
+/// one of `offsets` where the pixel is an even or an odd one of its row.
 #[inline(always)]
 pub fn run<T, const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(
     edges: &mut [Edge],
     out: &mut [T],
-    make: impl Fn(Packed<WIDTH, ROWS>, usize) -> T,
+    offsets: [u32; 2],
+    make: impl Fn(Packed<WIDTH, ROWS>) -> T,
 ) {
     let mut edges = edges.iter_mut();
     let Some(mut left) = edges.next().map(Edge::advance) else { return };
     for (edge, pixels) in edges.zip(out.as_chunks_mut::<PIXELS>().0) {
         let right = edge.advance();
         let step = Packed::<WIDTH, ROWS>::step(left, right, PIXELS.trailing_zeros());
-        let Packed(mut at) = Packed::<WIDTH, ROWS>::new(left);
-        for (x, pixel) in pixels.iter_mut().enumerate() {
-            *pixel = make(Packed(at), x);
-            at = at.wrapping_add(step);
-        }
+        alternate::<_, WIDTH, ROWS>(pixels, Packed::new(left), step, offsets, &make);
         left = right;
+    }
+}
+
+/// Paints `pixels` from `at` on, `step` further each, moved by one of `offsets` in turn.
+#[inline(always)]
+fn alternate<T, const WIDTH: u32, const ROWS: u32>(
+    pixels: &mut [T],
+    at: Packed<WIDTH, ROWS>,
+    step: u32,
+    [even, odd]: [u32; 2],
+    make: impl Fn(Packed<WIDTH, ROWS>) -> T,
+) {
+    let turn = odd.wrapping_sub(even);
+    let (there, back) = (step.wrapping_add(turn), step.wrapping_sub(turn));
+    let mut at = at.0.wrapping_add(even);
+    for (x, pixel) in pixels.iter_mut().enumerate() {
+        *pixel = make(Packed(at));
+        at = at.wrapping_add(if x & 1 == 0 { there } else { back });
     }
 }
 
@@ -81,7 +96,8 @@ pub fn any_run<T, const WIDTH: u32, const ROWS: u32>(
     edges: &mut [Edge],
     out: &mut [T],
     log2: u32,
-    make: impl Fn(Packed<WIDTH, ROWS>, usize) -> T,
+    offsets: [u32; 2],
+    make: impl Fn(Packed<WIDTH, ROWS>) -> T,
 ) {
     let mut edges = edges.iter_mut();
     let Some(mut left) = edges.next().map(Edge::advance) else { return };
@@ -96,11 +112,7 @@ pub fn any_run<T, const WIDTH: u32, const ROWS: u32>(
         while !pixels.is_empty() {
             let (four, rest) = pixels.split_at_mut(pixels.len().min(4));
             pixels = rest;
-            let Packed(mut at) = Packed::<WIDTH, ROWS>::new(left);
-            for (x, pixel) in four.iter_mut().enumerate() {
-                *pixel = make(Packed(at), x);
-                at = at.wrapping_add(step);
-            }
+            alternate::<_, WIDTH, ROWS>(four, Packed::new(left), step, offsets, &make);
             left = [left[0].wrapping_add((u as u32).wrapping_shl(2)), left[1].wrapping_add((v as u32).wrapping_shl(2))];
         }
         left = right;

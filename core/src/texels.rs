@@ -240,12 +240,13 @@ fn paint_run<F: Filter, const WIDTH: u32, const ROWS: u32>(
     log2: u32,
     colour: impl Fn(usize) -> u16,
 ) {
-    let make = |at: Packed<WIDTH, ROWS>, x: usize| filter.packed(at, x, &colour);
+    let offsets = filter.offsets(WIDTH);
+    let make = |at: Packed<WIDTH, ROWS>| filter.packed(at, &colour);
     // Blocks of four in a picture 512 wide are the rule, and have a loop of their own.
     if (WIDTH, log2) == (9, 2) {
-        span::run::<_, WIDTH, ROWS, 4>(edges, out, make);
+        span::run::<_, WIDTH, ROWS, 4>(edges, out, offsets, make);
     } else {
-        span::any_run(edges, out, log2, make);
+        span::any_run(edges, out, log2, offsets, make);
     }
 }
 
