@@ -5,7 +5,7 @@ use crate::Bundle;
 use crate::fixed::PlayUv;
 use crate::lists::{CHART, FIELD};
 use crate::memory::Workspace;
-use crate::plan::{Edge, Mixed, Plan, Run, Site};
+use crate::plan::{Mixed, Plan, Run, Site, TILE_LOG2, Tile};
 use crate::span::{self, Field, Packed, Span};
 use crate::work::{Probe, Work};
 
@@ -22,8 +22,8 @@ pub trait Paint {
     /// The pixel at `uv`, which is inside the picture; `x`: whether it is an odd one of its row.
     fn at(&self, uv: PlayUv, label: u8, x: usize) -> Self::Pixel;
 
-    /// A run's pixels, in windows of 2^ROWS rows of 2^WIDTH texels, `TEXELS` in all; `log2`: of a block's pixels.
-    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [Self::Pixel], log2: u32);
+    /// A run's pixels, in windows of 2^ROWS rows of 2^WIDTH texels, `TEXELS` in all; `log2`: of a tile's pixels.
+    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, tiles: &mut [Tile], out: &mut [Self::Pixel], log2: u32);
 }
 
 /// Where pixels come from.
@@ -39,9 +39,9 @@ impl Paint for Probes {
         Probe { label, at: uv }
     }
 
-    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [Probe], log2: u32) {
+    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, tiles: &mut [Tile], out: &mut [Probe], log2: u32) {
         let label = run.label as u8;
-        span::any_run(edges, out, log2, [0; 2], |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(run.row) });
+        span::any_run(tiles, out, log2, [0; 2], |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(run.row) });
     }
 }
 
@@ -78,7 +78,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
     /// Draws the runs of pixel row `y`. What there is of `out` on the screen comes back: its mixed blocks are still to be drawn.
     #[inline(always)]
     fn runs<'o, P: Paint>(&mut self, y: u32, out: &'o mut [P::Pixel], work: &mut Work, paint: &P) -> &'o mut [P::Pixel] {
-        let log2 = self.site.log2();
+        let log2 = self.site.tile_log2();
         let (strip, row) = (y >> log2, y & (1u32 << log2).wrapping_sub(1));
         if self.plan.strip != Some(strip) || self.plan.row > row || self.plan.reach != P::REACH {
             self.plan.make(&self.site, strip, P::REACH);
@@ -87,15 +87,15 @@ impl<'d, 'a> Drawing<'d, 'a> {
         let width = self.site.bundle.size().0 as usize;
         let drawn = out.len().min(width);
         let out = out.get_mut(..drawn).unwrap_or(&mut []);
-        let Plan { edge, run: runs, runs: count, .. } = &mut *self.plan;
+        let Plan { tile, run: runs, runs: count, .. } = &mut *self.plan;
         for &run in runs.get(..*count).unwrap_or(&[]) {
-            let first = usize::from(run.edge);
-            let Some(edges) = edge.get_mut(first..=first.wrapping_add(run.blocks.into())) else { continue };
-            let from = usize::from(run.block).wrapping_shl(log2);
-            let to = usize::from(run.block).wrapping_add(run.blocks.into()).wrapping_shl(log2);
+            let first = usize::from(run.tile);
+            let Some(tiles) = tile.get_mut(first..first.wrapping_add(run.count.into())) else { continue };
+            let from = usize::from(run.place).wrapping_shl(log2);
+            let to = usize::from(run.place).wrapping_add(run.count.into()).wrapping_shl(log2);
             match out.get_mut(from..to) {
-                Some(pixels) => by_width(paint, run, edges, pixels, log2, self.site.bundle.texture().width_log2),
-                None => cut(paint, run, edges, out, log2, self.site.bundle.texture().width_log2),
+                Some(pixels) => by_width(paint, run, tiles, pixels, log2, self.site.bundle.texture().width_log2),
+                None => cut(paint, run, tiles, out, log2, self.site.bundle.texture().width_log2),
             }
         }
         self.plan.row = row.wrapping_add(1);
@@ -145,34 +145,29 @@ impl Mixed {
 
 /// A run's pixels by the width of the picture: those that `plan` has windows for.
 #[inline(never)]
-fn by_width<P: Paint>(paint: &P, run: Run, edges: &mut [Edge], out: &mut [P::Pixel], log2: u32, width_log2: u32) {
+fn by_width<P: Paint>(paint: &P, run: Run, tiles: &mut [Tile], out: &mut [P::Pixel], log2: u32, width_log2: u32) {
     match width_log2 {
-        8 => paint.run::<8, 5, 0x2000>(run, edges, out, log2),
-        9 => paint.run::<9, 5, 0x4000>(run, edges, out, log2),
-        _ => paint.run::<10, 4, 0x4000>(run, edges, out, log2),
+        8 => paint.run::<8, 5, 0x2000>(run, tiles, out, log2),
+        9 => paint.run::<9, 5, 0x4000>(run, tiles, out, log2),
+        _ => paint.run::<10, 4, 0x4000>(run, tiles, out, log2),
     }
 }
 
-/// A run that reaches past the end of `out`: block by block, and of the last only what there is.
+/// A run that reaches past the end of `out`: tile by tile, and of the last only what there is.
 #[inline(never)]
-fn cut<P: Paint>(paint: &P, run: Run, edges: &mut [Edge], out: &mut [P::Pixel], log2: u32, width_log2: u32) {
-    let from = usize::from(run.block).wrapping_shl(log2);
+fn cut<P: Paint>(paint: &P, run: Run, tiles: &mut [Tile], out: &mut [P::Pixel], log2: u32, width_log2: u32) {
+    let from = usize::from(run.place).wrapping_shl(log2);
     let mut out = out.get_mut(from..).unwrap_or(&mut []);
-    for index in 0..usize::from(run.blocks) {
+    for tile in tiles {
         let (pixels, rest) = out.split_at_mut(out.len().min(1 << log2));
         out = rest;
-        // Copies: an edge belongs to two blocks, and is stepped once.
-        let Some(&[left, right]) = edges.get(index..).and_then(<[Edge]>::first_chunk::<2>) else { break };
-        let mut whole = [P::Pixel::default(); 32];
-        if let Some(block) = whole.get_mut(..1 << log2) {
-            by_width(paint, run, &mut [left, right], block, log2, width_log2);
+        let mut whole = [P::Pixel::default(); 1 << TILE_LOG2];
+        if let Some(made) = whole.get_mut(..1 << log2) {
+            by_width(paint, run, core::slice::from_mut(tile), made, log2, width_log2);
         }
         for (pixel, made) in pixels.iter_mut().zip(whole) {
             *pixel = made;
         }
-    }
-    for edge in edges {
-        edge.advance();
     }
 }
 

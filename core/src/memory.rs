@@ -10,7 +10,7 @@ use crate::key::Key;
 use crate::lists::{self, Lists};
 use crate::nodes;
 use crate::pack::{self, Picture, Recent, Scratch};
-use crate::plan::{Edge, Mixed, Plan, Run};
+use crate::plan::{Mixed, Plan, Run, TILE_LOG2, Tile};
 use crate::record::Stream;
 use crate::row::{Chain, NodeRow, Piece, Point};
 use crate::sheet::{RowSheets, Sheet, Stretch};
@@ -104,7 +104,9 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, texture: Texture<'m>) -
     let fields = usize::from(limits.fields);
     let one_more = |count: usize| count.saturating_add(1);
     let cubic = bundle.path().space == SPACE_CUBIC;
+    let block_log2 = grid.log2.saturating_sub(cubic.into());
     let blocks = grid.columns.saturating_mul(if cubic { 2 } else { 1 });
+    let tiles = grid.columns.checked_shl(grid.log2.saturating_sub(block_log2.min(TILE_LOG2))).unwrap_or(0);
     let row_sheets = usize::from(limits.row_sheets);
     let node_row = |cutter: &mut Cutter<'m>, wanted: bool, fields: bool| {
         let if_wanted = |count: usize| if wanted { count } else { 0 };
@@ -150,14 +152,12 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, texture: Texture<'m>) -
         pieces: cutter.take::<Piece>(row_layers),
         sheets: RowSheets { stretch: cutter.take::<Stretch>(grid.columns), stretches: 0, sheet: cutter.take::<Sheet>(row_sheets) },
         plan: Plan {
-            // Runs of one block each would have two edges a block.
-            edge: cutter.take::<Edge>(blocks.saturating_mul(2)),
-            run: cutter.take::<Run>(blocks),
+            tile: cutter.take::<Tile>(tiles),
+            run: cutter.take::<Run>(tiles),
             mixed: cutter.take::<Mixed>(blocks),
-            edges: 0,
+            tiles: 0,
             runs: 0,
             mixes: 0,
-            last: [0; 2],
             strip: None,
             reach: 0,
             row: 0,

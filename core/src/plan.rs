@@ -1,7 +1,7 @@
 //! What a strip of the screen shows, block by block, worked out once for all of its rows: where one sheet covers a block, and where
 //! several take turns. A strip is as many rows as a block is high. Sheets come from `sheet`; rows of pixels are drawn from it by `span`.
 //!
-//! Blocks that show one sheet stand in **runs**: neighbours of one label, whose common edges are stepped once a row. A run's
+//! Blocks that show one sheet stand in **runs** of **tiles**, neighbours of one label, each of which is stepped once a row. A run's
 //! positions lie in a **window** of the source image, so many rows of it that a position there is one 32-bit number.
 
 use crate::Bundle;
@@ -13,41 +13,44 @@ use crate::lists::{CHART, FIELD};
 use crate::row::Layer;
 use crate::sheet::{Block, Corners, RowSheets, Rows, Sheet, Stretch};
 
-/// A side of a block in a run, in caller's memory: where it stands at the strip's current row, and how far that is from row to row.
-/// u counts the picture's width as 2^32, v its window's rows as 2^31.
+/// A tile of a run, in caller's memory: 2^[`TILE_LOG2`] pixels of a row, or a block's where that is smaller. All are positions in the run's
+/// window, or differences of such, as [`crate::span::Packed`] holds them.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
-pub struct Edge {
-    /// Across.
-    pub u: u32,
-    /// Down.
-    pub v: u32,
-    /// A row further: across.
-    pub down_u: u32,
-    /// A row further: down.
-    pub down_v: u32,
+pub struct Tile {
+    /// Where its first pixel is at the strip's current row.
+    at: u32,
+    /// How far it is from pixel to pixel there.
+    step: u32,
+    /// How far it is from row to row,
+    down: u32,
+    /// and how the step changes.
+    turn: u32,
 }
 
-impl Edge {
-    /// Steps to the next row; returns where it was.
+impl Tile {
+    /// Steps to the next row; returns where it was, and its step there.
     #[inline(always)]
     pub const fn advance(&mut self) -> [u32; 2] {
-        let was = [self.u, self.v];
-        (self.u, self.v) = (self.u.wrapping_add(self.down_u), self.v.wrapping_add(self.down_v));
+        let was = [self.at, self.step];
+        (self.at, self.step) = (self.at.wrapping_add(self.down), self.step.wrapping_add(self.turn));
         was
     }
 }
 
-/// Neighbouring blocks that show one sheet of one label, in caller's memory.
+/// Tiles are at most 2^this pixels wide and high: over more of them rounding would add up to something.
+pub const TILE_LOG2: u32 = 3;
+
+/// Neighbouring tiles that show one sheet of one label, in caller's memory.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Run {
-    /// The first block, from the left.
-    pub block: u16,
-    /// How many there are. They have one edge more.
-    pub blocks: u16,
-    /// The first edge.
-    pub edge: u16,
+    /// The first tile, from the left of the screen.
+    pub place: u16,
+    /// How many there are.
+    pub count: u16,
+    /// The first of them in memory.
+    pub tile: u16,
     /// The window's first row.
     pub row: u16,
     /// The label.
@@ -86,63 +89,55 @@ impl Window {
         if known && height >= 1 << rows_log2 { Some(Self { width_log2, rows_log2 }) } else { None }
     }
 
-    /// How far u is shifted up from Q16 texels.
-    const fn shift_u(self) -> u32 {
-        16u32.wrapping_sub(self.width_log2)
-    }
-
-    /// How far v is shifted up from Q16 texels.
-    const fn shift_v(self) -> u32 {
-        15u32.wrapping_sub(self.rows_log2)
-    }
-
-    /// The edge between `above` and `below`, 2^`log2` rows apart, in a window from `row` on.
+    /// A difference of u and v in Q16 texels, or a position with v from the window's first row on, as [`crate::span::Packed`] holds it,
+    /// divided by 2^`log2`, each to the nearest.
     #[inline(always)]
-    const fn edge(self, above: PlayUv, below: PlayUv, row: u32, log2: u32) -> Edge {
-        let (shift_u, shift_v) = (self.shift_u(), self.shift_v());
-        let [half_u, half_v] = halves(self.width_log2, self.rows_log2);
-        // Both shifts are at least 5: the steps lose nothing.
-        Edge {
-            u: (above.u as u32).wrapping_shl(shift_u).wrapping_add(half_u),
-            v: (above.v as u32).wrapping_sub(row.wrapping_shl(16)).wrapping_shl(shift_v).wrapping_add(half_v),
-            down_u: (below.u.wrapping_sub(above.u) as u32).wrapping_shl(shift_u.wrapping_sub(log2)),
-            down_v: (below.v.wrapping_sub(above.v) as u32).wrapping_shl(shift_v.wrapping_sub(log2)),
+    fn pack(self, u: i32, v: i32, log2: u32) -> u32 {
+        let bits = self.width_log2.wrapping_add(self.rows_log2);
+        // u has what v and whole texels leave of 32 bits for its fraction, v as many as the picture's width.
+        let across = 16u32.wrapping_add(bits).wrapping_add(self.width_log2).wrapping_sub(32).wrapping_add(log2);
+        let down = 16u32.wrapping_sub(self.width_log2).wrapping_add(log2);
+        let rounded = |x: i32, drop: u32| x.wrapping_add(1i32.wrapping_shl(drop) >> 1).wrapping_shr(drop);
+        (rounded(u, across) as u32).wrapping_shl(bits).wrapping_add(rounded(v, down) as u32)
+    }
+
+    /// The tile of 2^`log2` by 2^`log2` pixels between corners `a` and `b` above, `c` and `d` below, in a window from `row` on.
+    #[inline(always)]
+    fn tile(self, [a, b, c, d]: Corners, row: u32, log2: u32) -> Tile {
+        let (above_u, above_v) = (b.u.wrapping_sub(a.u), b.v.wrapping_sub(a.v));
+        let (below_u, below_v) = (d.u.wrapping_sub(c.u), d.v.wrapping_sub(c.v));
+        Tile {
+            at: self.pack(a.u, a.v.wrapping_sub((row as i32).wrapping_shl(16)), 0),
+            step: self.pack(above_u, above_v, log2),
+            down: self.pack(c.u.wrapping_sub(a.u), c.v.wrapping_sub(a.v), log2),
+            turn: self.pack(below_u.wrapping_sub(above_u), below_v.wrapping_sub(above_v), log2.wrapping_mul(2)),
         }
     }
 }
 
-/// Half a step of u and of v, as edges count them: an edge's position has it added, so that cutting bits off rounds to nearest.
-#[must_use]
-pub const fn halves(width_log2: u32, rows_log2: u32) -> [u32; 2] {
-    let bits = width_log2.wrapping_add(rows_log2);
-    [1u32.wrapping_shl(bits.wrapping_sub(1)), 1u32.wrapping_shl(30u32.wrapping_sub(bits))]
-}
-
 /// Positions in runs keep this far from the edges of picture and window, Q16 texels, beside what pixels reach to: more than rounding moves them.
-const MARGIN: i32 = 1 << 10;
+const MARGIN: i32 = 1 << 13;
 
 /// A strip's blocks, in caller's memory.
 #[derive(Debug)]
 pub struct Plan<'m> {
-    /// The runs' edges, from left to right.
-    pub edge: &'m mut [Edge],
+    /// The runs' tiles, from left to right.
+    pub tile: &'m mut [Tile],
     /// The runs.
     pub run: &'m mut [Run],
     /// The other blocks.
     pub mixed: &'m mut [Mixed],
     /// How many of each there are.
-    pub edges: usize,
+    pub tiles: usize,
     /// Runs.
     pub runs: usize,
     /// Mixed blocks.
     pub mixes: usize,
-    /// Where the last edge's ends are across, Q16 texels: above, below.
-    pub last: [i32; 2],
-    /// The strip it is about; none: nothing yet.
+    /// The row of tiles it is about, from the top of the screen; none: nothing yet.
     pub strip: Option<u32>,
     /// How far around a position pixels are told from, Q16 texels.
     pub reach: i32,
-    /// The row of the strip at which the edges stand.
+    /// The row of pixels of it at which the tiles stand.
     pub row: u32,
     /// Pixels of a row in cells of one sheet.
     pub smooth: u32,
@@ -182,6 +177,12 @@ impl Site<'_, '_, '_> {
         if self.cubic() { cell.wrapping_sub(1) } else { cell }
     }
 
+    /// A tile is 2^this pixels wide and high.
+    #[must_use]
+    pub fn tile_log2(&self) -> u32 {
+        self.log2().min(TILE_LOG2)
+    }
+
     /// Block `block` of strip `strip`, where space is cubic.
     #[must_use]
     #[inline(always)]
@@ -189,10 +190,14 @@ impl Site<'_, '_, '_> {
         Block { rows: self.rows, quarter: Some([block & 1 == 1, strip & 1 == 1]) }
     }
 
-    /// What is above and below strip `strip` where space is cubic, from the left corners of `sheet` on: nodes, and halfway to the next.
+    /// What is above and below strip `strip`, from the left corners of `sheet` on: nodes, and halfway to the next.
     fn lines(&self, strip: u32, sheet: &Sheet) -> [&[Layer]; 2] {
         let ([top, halfway, bottom], [a, b, c]) = (self.rows, sheet.nodes());
-        let lines = if strip & 1 == 0 { [(top, a), (halfway, b)] } else { [(halfway, b), (bottom, c)] };
+        let lines = match (self.cubic(), strip & 1) {
+            (false, _) => [(top, a), (bottom, c)],
+            (true, 0) => [(top, a), (halfway, b)],
+            (true, _) => [(halfway, b), (bottom, c)],
+        };
         lines.map(|(row, from)| row.point.get(usize::from(from)..).and_then(|points| bytemuck::try_cast_slice(points).ok()).unwrap_or(&[]))
     }
 
@@ -208,16 +213,18 @@ impl Site<'_, '_, '_> {
 }
 
 impl Plan<'_> {
-    /// Plans strip `strip` of the screen, for pixels that are told from as far as `reach` around a position.
+    /// Plans row `strip` of the screen's tiles, for pixels that are told from as far as `reach` around a position.
     #[inline(never)]
     pub fn make(&mut self, site: &Site<'_, '_, '_>, strip: u32, reach: i32) {
-        (self.edges, self.runs, self.mixes) = (0, 0, 0);
+        (self.tiles, self.runs, self.mixes) = (0, 0, 0);
         (self.smooth, self.torn, self.tests) = (0, 0, 0);
         (self.strip, self.row, self.reach) = (Some(strip), 0, reach);
         let texture = site.bundle.texture();
         let window = Window::new(texture.width_log2, texture.height);
         let (log2, width) = (site.log2(), site.bundle.size().0);
-        let mut across = Across { site, window, strip, log2, width, left: 0, block: 0 };
+        let parts_log2 = log2.wrapping_sub(site.tile_log2());
+        let (strip, part) = (strip.wrapping_shr(parts_log2), strip & 1u32.wrapping_shl(parts_log2).wrapping_sub(1));
+        let mut across = Across { site, window, strip, part, parts_log2, log2, width, left: 0, block: 0 };
         for &stretch in site.sheets.stretches() {
             match site.sheets.of(stretch) {
                 [sheet] => self.smooth(&mut across, stretch, sheet),
@@ -233,15 +240,19 @@ impl Plan<'_> {
         let before = across.left;
         let mut along = 0u16;
         while along < stretch.cells && across.left < width {
-            // In pictures 512 wide, as most are; others go by `append` alone. Likewise the cell that the screen's edge cuts.
+            // In pictures 512 wide, as most are, and cells of eight pixels; others go by `append` alone. Likewise the cell that the screen's edge cuts.
             if let Some(Window { width_log2: 9, .. }) = window
-                && site.cubic()
+                && site.bundle.grid().log2 == 3
             {
-                let most = (width.saturating_sub(across.left) >> log2 >> 1).min(stretch.cells.wrapping_sub(along).into());
+                let most = (width.saturating_sub(across.left) >> 3).min(stretch.cells.wrapping_sub(along).into());
                 let rest = lines.map(|line| line.get(usize::from(along).wrapping_mul(2)..).unwrap_or(&[]));
-                let cells = self.extend(across.block, most as usize, sheet.label(), rest, log2);
+                let cells = if site.cubic() {
+                    self.extend::<1, 2>(across.block, most as usize, sheet.label(), rest)
+                } else {
+                    self.extend::<2, 3>(across.block, most as usize, sheet.label(), rest)
+                };
                 along = along.wrapping_add(cells);
-                across.block = across.block.wrapping_add(u32::from(cells).wrapping_mul(2));
+                across.block = across.block.wrapping_add(u32::from(cells).wrapping_mul(across.blocks()));
                 across.left = across.block.wrapping_shl(log2);
                 if along == stretch.cells {
                     break;
@@ -278,48 +289,53 @@ impl Plan<'_> {
         *kind = kind.wrapping_add(pixels);
     }
 
-    /// Appends smooth cells, the first of which begins with block `block`, to the last run, both blocks of each, as long as they follow it and fit
-    /// into its window, `most` at most; returns how many. `above` and `below` start at their left corners.
+    /// Appends smooth cells, the first of which begins with tile `place`, to the last run, as long as they follow it and fit into its window, `most`
+    /// at most; returns how many. `above` and `below` start at their left corners: nodes, and halfway to the next. Tiles of 2^LOG2 pixels are between
+    /// every EVERY-th of these: two a cell, or one, where what is halfway is skipped.
     #[inline(never)]
-    fn extend(&mut self, block: u32, most: usize, label: u8, [above, below]: [&[Layer]; 2], log2: u32) -> u16 {
+    fn extend<const EVERY: usize, const LOG2: u32>(&mut self, place: u32, most: usize, label: u8, [above, below]: [&[Layer]; 2]) -> u16 {
         let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return 0 };
-        if run.label != u16::from(label) || u32::from(run.block).wrapping_add(u32::from(run.blocks)) != block {
+        if run.label != u16::from(label) || u32::from(run.place).wrapping_add(u32::from(run.count)) != place {
             return 0;
         }
-        let (Some((_, above)), Some((_, below))) = (above.split_first(), below.split_first()) else { return 0 };
-        let Some(edges) = self.edge.get_mut(self.edges..) else { return 0 };
+        let Some(slots) = self.tile.get_mut(self.tiles..) else { return 0 };
+        let tiles = 3usize.wrapping_sub(EVERY);
+        let Some(slots) = slots.get_mut(..most.wrapping_mul(tiles)) else { return 0 };
         let window = Window { width_log2: 9, rows_log2: 5 };
-        let row = u32::from(run.row);
+        let first = i32::from(run.row).wrapping_shl(16);
+        // Inside as far as the margin from either side: sums of both are below a power of two.
         let margin = MARGIN.wrapping_add(self.reach);
-        let least = (row as i32).wrapping_shl(16).wrapping_add(margin);
-        let [across, down] = [window.width_log2, window.rows_log2].map(|log2| 1u32.wrapping_shl(log2.wrapping_add(16)));
-        let [wide, high] = [across, down].map(|size| size.wrapping_sub(margin.wrapping_mul(2) as u32));
-        let [mut from, mut to] = self.last;
+        let inside = |x: i32, y: i32, log2: u32| {
+            let [less, more] = [x, y].map(|x| (x.wrapping_sub(margin) | x.wrapping_add(margin)) as u32);
+            (less | more) >> log2.wrapping_add(16) == 0
+        };
+        let mut ends = above.as_chunks::<EVERY>().0.iter().zip(below.as_chunks::<EVERY>().0).filter_map(|(b, d)| b.first().zip(d.first()));
+        let Some((a, c)) = ends.next().map(|(a, c)| (a.uv(), c.uv())) else { return 0 };
+        let (mut u, mut v) = (a.u, a.v.wrapping_sub(first));
+        let (mut down_u, mut down_v) = (c.u.wrapping_sub(a.u), c.v.wrapping_sub(a.v));
         let mut done = 0usize;
-        for ((edge, a), b) in edges.iter_mut().zip(above).zip(below).take(most.wrapping_mul(2)) {
-            let (a, b) = (a.uv(), b.uv());
-            // As in `append`: steps across of less than half the width, which is a power of two.
-            let [near, far] = [a.u.wrapping_sub(from), b.u.wrapping_sub(to)].map(|step| step.wrapping_add((across >> 1) as i32) as u32);
-            let inside = (a.u.wrapping_sub(margin) as u32) < wide && (b.u.wrapping_sub(margin) as u32) < wide && (near | far) < across;
-            if !(inside && (a.v.wrapping_sub(least) as u32) < high && (b.v.wrapping_sub(least) as u32) < high) {
+        for (slot, (b, d)) in slots.iter_mut().zip(ends) {
+            let (b, d) = (b.uv(), d.uv());
+            let (right_u, right_v) = (b.u, b.v.wrapping_sub(first));
+            if !(inside(b.u, d.u, window.width_log2) && inside(right_v, d.v.wrapping_sub(first), window.rows_log2)) {
                 break;
             }
-            *edge = window.edge(a, b, row, log2);
-            (from, to) = (a.u, b.u);
+            let (right_down_u, right_down_v) = (d.u.wrapping_sub(b.u), d.v.wrapping_sub(b.v));
+            *slot = Tile {
+                at: window.pack(u, v, 0),
+                step: window.pack(right_u.wrapping_sub(u), right_v.wrapping_sub(v), LOG2),
+                down: window.pack(down_u, down_v, LOG2),
+                turn: window.pack(right_down_u.wrapping_sub(down_u), right_down_v.wrapping_sub(down_v), LOG2.wrapping_mul(2)),
+            };
+            (u, v, down_u, down_v) = (right_u, right_v, right_down_u, right_down_v);
             done = done.wrapping_add(1);
         }
-        if done & 1 == 1 {
-            // Half a cell is for `append`, which finds the same.
-            done = done.wrapping_sub(1);
-            let before =
-                |line: &[Layer], known: i32| done.checked_sub(1).and_then(|last| line.get(last)).map_or(known, |layer| layer.uv().u);
-            let [a, b] = self.last;
-            (from, to) = (before(above, a), before(below, b));
-        }
-        run.blocks = run.blocks.wrapping_add(done as u16);
-        self.edges = self.edges.wrapping_add(done);
-        self.last = [from, to];
-        (done >> 1) as u16
+        // Half a cell is for `append`, which finds the same.
+        let cells = if tiles == 1 { done } else { done >> 1 };
+        let done = cells.wrapping_mul(tiles);
+        run.count = run.count.wrapping_add(done as u16);
+        self.tiles = self.tiles.wrapping_add(done);
+        cells as u16
     }
 
     fn mix(&mut self, mixed: Mixed) {
@@ -329,40 +345,57 @@ impl Plan<'_> {
         }
     }
 
-    /// Appends the block at `across`, which shows one sheet, to the last run, or begins another; false where its positions fit no window.
+    /// Appends the block at `across`, which shows one sheet, to the last run, or begins others; false where its positions fit no window. What was
+    /// appended then is drawn over.
     #[inline(never)]
-    fn append(&mut self, across: &Across<'_, '_, '_>, sheet: &Sheet, corners: Corners) -> bool {
+    fn append(&mut self, across: &Across<'_, '_, '_>, sheet: &Sheet, [a, b, c, d]: Corners) -> bool {
         let Some(window) = across.window else { return false };
-        let (block, log2, height) = (across.block as u16, across.log2, across.site.texture.height);
+        let label = u16::from(sheet.label());
+        let log2 = across.parts_log2;
+        if log2 == 0 {
+            return self.tile(across, window, label, across.block as u16, [a, b, c, d]);
+        }
+        // The row of the block's tiles, then one after the other.
+        let between = |from: PlayUv, to: PlayUv, part: u32| {
+            // Positions differ by less than 2^28.6, and a block has at most four tiles a side.
+            let along = |from: i32, to: i32| from.wrapping_add(to.wrapping_sub(from).wrapping_mul(part as i32) >> log2);
+            PlayUv { u: along(from.u, to.u), v: along(from.v, to.v) }
+        };
+        let next = across.part.wrapping_add(1);
+        let [a, c] = [between(a, c, across.part), between(a, c, next)];
+        let [b, d] = [between(b, d, across.part), between(b, d, next)];
+        (0..1u32.wrapping_shl(log2)).all(|part| {
+            let corners =
+                [between(a, b, part), between(a, b, part.wrapping_add(1)), between(c, d, part), between(c, d, part.wrapping_add(1))];
+            self.tile(across, window, label, across.block.wrapping_shl(log2).wrapping_add(part) as u16, corners)
+        })
+    }
+
+    /// Appends the tile at `place` to the last run, or begins another; false where its positions fit no window.
+    fn tile(&mut self, across: &Across<'_, '_, '_>, window: Window, label: u16, place: u16, corners: Corners) -> bool {
+        let (log2, height) = (across.log2.wrapping_sub(across.parts_log2), across.site.texture.height);
         let [a, b, c, d] = corners;
-        let width = 1i32.wrapping_shl(window.width_log2.wrapping_add(16));
         let margin = MARGIN.wrapping_add(self.reach);
-        let inside = |x: i32, limit: i32| (x.wrapping_sub(margin) as u32) < limit.wrapping_sub(margin.wrapping_mul(2)) as u32;
-        // Steps across are told from differences of less than half the width.
-        let near = |from: i32, to: i32| (to.wrapping_sub(from).wrapping_add(width >> 1) as u32) < width as u32;
-        if !(inside(b.u, width) && inside(d.u, width) && near(a.u, b.u) && near(c.u, d.u)) {
+        let inside = |x: i32, log2: u32| {
+            (x.wrapping_sub(margin) as u32) < 1u32.wrapping_shl(log2.wrapping_add(16)).wrapping_sub(margin.wrapping_mul(2) as u32)
+        };
+        if !corners.iter().all(|uv| inside(uv.u, window.width_log2)) {
             return false;
         }
-        let rows = 1i32.wrapping_shl(window.rows_log2.wrapping_add(16));
-        let label = u16::from(sheet.label());
-        let within = |row: u16, uv: PlayUv| inside(uv.v.wrapping_sub(i32::from(row).wrapping_shl(16)), rows);
+        let within = |row: u16| corners.iter().all(|uv| inside(uv.v.wrapping_sub(i32::from(row).wrapping_shl(16)), window.rows_log2));
+        let Some(slot) = self.tile.get_mut(self.tiles) else { return false };
         let last = self.runs.wrapping_sub(1);
-        if let (Some(run), Some(slot)) = (self.run.get_mut(last), self.edge.get_mut(self.edges))
+        if let Some(run) = self.run.get_mut(last)
             && run.label == label
-            && run.block.wrapping_add(run.blocks) == block
-            && within(run.row, b)
-            && within(run.row, d)
+            && run.place.wrapping_add(run.count) == place
+            && within(run.row)
         {
-            *slot = window.edge(b, d, run.row.into(), log2);
-            run.blocks = run.blocks.wrapping_add(1);
-            self.edges = self.edges.wrapping_add(1);
-            self.last = [b.u, d.u];
+            *slot = window.tile(corners, run.row.into(), log2);
+            run.count = run.count.wrapping_add(1);
+            self.tiles = self.tiles.wrapping_add(1);
             return true;
         }
-        if !(inside(a.u, width) && inside(c.u, width)) {
-            return false;
-        }
-        // The window begins or ends at the block, so that it has room where the run is heading.
+        // The window begins or ends at the tile, so that it has room where the run is heading.
         let (low, high) = (a.v.min(b.v).min(c.v.min(d.v)), a.v.max(b.v).max(c.v.max(d.v)));
         let onwards = b.v.wrapping_add(d.v) >= a.v.wrapping_add(c.v);
         let row = if onwards {
@@ -371,24 +404,18 @@ impl Plan<'_> {
             (high.wrapping_add(margin) >> 16).wrapping_add(1).wrapping_sub(1i32.wrapping_shl(window.rows_log2))
         };
         let row = row.min(height.wrapping_sub(1u32.wrapping_shl(window.rows_log2)) as i32).max(0) as u16;
-        if ![a, b, c, d].into_iter().all(|uv| within(row, uv)) {
-            return false;
-        }
-        let after = self.edges.wrapping_add(2);
-        let (Some(slot), Some([left, right])) = (self.run.get_mut(self.runs), self.edge.get_mut(self.edges..after)) else { return false };
-        *left = window.edge(a, c, row.into(), log2);
-        *right = window.edge(b, d, row.into(), log2);
-        *slot = Run { block, blocks: 1, edge: self.edges as u16, row, label };
-        (self.edges, self.runs) = (after, self.runs.wrapping_add(1));
-        self.last = [b.u, d.u];
+        let Some(run) = self.run.get_mut(self.runs).filter(|_| within(row)) else { return false };
+        *slot = window.tile(corners, row.into(), log2);
+        *run = Run { place, count: 1, tile: self.tiles as u16, row, label };
+        (self.tiles, self.runs) = (self.tiles.wrapping_add(1), self.runs.wrapping_add(1));
         true
     }
 
-    /// Steps the edges down to row `row` of the strip, which none of them is past.
+    /// Steps the tiles down to row `row`, which none of them is past.
     pub fn skip_to(&mut self, row: u32) {
         for _ in self.row..row {
-            for edge in self.edge.get_mut(..self.edges).unwrap_or(&mut []) {
-                edge.advance();
+            for tile in self.tile.get_mut(..self.tiles).unwrap_or(&mut []) {
+                tile.advance();
             }
         }
         self.row = row;
@@ -401,6 +428,9 @@ struct Across<'s, 'a, 'm> {
     site: &'s Site<'s, 'a, 'm>,
     window: Option<Window>,
     strip: u32,
+    /// The row of tiles in the strip, and how many the strip has: 2^`parts_log2`.
+    part: u32,
+    parts_log2: u32,
     log2: u32,
     /// The screen's width, and pixels to the left of the next block.
     width: u32,

@@ -4,7 +4,7 @@
 use crate::atlas::Texture;
 use crate::coverage::{Chart, Cover};
 use crate::fixed::PlayUv;
-use crate::plan::{Edge, halves};
+use crate::plan::{TILE_LOG2, Tile};
 use crate::sheet::Corners;
 
 /// A position in a window: v in its lower WIDTH + ROWS bits, WIDTH of them its fraction, u above, its upper WIDTH bits the texel.
@@ -14,28 +14,10 @@ pub struct Packed<const WIDTH: u32, const ROWS: u32>(pub u32);
 impl<const WIDTH: u32, const ROWS: u32> Packed<WIDTH, ROWS> {
     const BITS: u32 = WIDTH + ROWS;
     const LOW: u32 = (1 << Self::BITS) - 1;
-    /// How far an edge's v is shifted down.
-    const DROP: u32 = 31 - Self::BITS;
     /// How far the texel's column is shifted down.
     const ACROSS: u32 = 32 - WIDTH;
     /// The texel's row, which stands where its place in the window has it.
     const DOWN: u32 = Self::LOW & !((1 << WIDTH) - 1);
-
-    #[inline(always)]
-    const fn new([u, v]: [u32; 2]) -> Self {
-        Self((u & !Self::LOW) | v >> Self::DROP)
-    }
-
-    /// The 2^`log2`-th part of the way from `left` to `right`, rounded to nearest.
-    #[inline(always)]
-    const fn step(left: [u32; 2], right: [u32; 2], log2: u32) -> u32 {
-        let [half_u, half_v] = halves(WIDTH, ROWS);
-        let u = right[0].wrapping_sub(left[0]).wrapping_add(half_u.wrapping_shl(log2));
-        let v = right[1].wrapping_sub(left[1]).wrapping_add(half_v.wrapping_shl(log2));
-        let u = u & !(Self::LOW.wrapping_shl(log2) | 1u32.wrapping_shl(log2).wrapping_sub(1));
-        let v = v as i32 >> Self::DROP.wrapping_add(log2);
-        (v as u32).wrapping_add((u as i32 >> log2) as u32)
-    }
 
     /// The texel's place in its window, below 2^(WIDTH + ROWS).
     #[must_use]
@@ -53,69 +35,48 @@ impl<const WIDTH: u32, const ROWS: u32> Packed<WIDTH, ROWS> {
     }
 }
 
-/// Paints `out`, a run's blocks of `PIXELS` pixels each, and steps its edges down a row. `make` turns a position into a pixel, once it is moved by
+/// Paints `out`, a run's `tiles` of `PIXELS` pixels each, and steps them down a row. `make` turns a position into a pixel, once it is moved by
 /// one of `offsets` where the pixel is an even or an odd one of its row.
 #[inline(always)]
 pub fn run<T, const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(
-    edges: &mut [Edge],
+    tiles: &mut [Tile],
     out: &mut [T],
     offsets: [u32; 2],
     make: impl Fn(Packed<WIDTH, ROWS>) -> T,
 ) {
-    let mut edges = edges.iter_mut();
-    let Some(mut left) = edges.next().map(Edge::advance) else { return };
-    for (edge, pixels) in edges.zip(out.as_chunks_mut::<PIXELS>().0) {
-        let right = edge.advance();
-        let step = Packed::<WIDTH, ROWS>::step(left, right, PIXELS.trailing_zeros());
-        alternate::<_, WIDTH, ROWS>(pixels, Packed::new(left), step, offsets, &make);
-        left = right;
+    for (tile, pixels) in tiles.iter_mut().zip(out.as_chunks_mut::<PIXELS>().0) {
+        alternate(pixels, tile.advance(), offsets, &make);
     }
 }
 
-/// Paints `pixels` from `at` on, `step` further each, moved by one of `offsets` in turn.
-#[inline(always)]
-fn alternate<T, const WIDTH: u32, const ROWS: u32>(
-    pixels: &mut [T],
-    at: Packed<WIDTH, ROWS>,
-    step: u32,
-    [even, odd]: [u32; 2],
-    make: impl Fn(Packed<WIDTH, ROWS>) -> T,
-) {
-    let turn = odd.wrapping_sub(even);
-    let (there, back) = (step.wrapping_add(turn), step.wrapping_sub(turn));
-    let mut at = at.0.wrapping_add(even);
-    for (x, pixel) in pixels.iter_mut().enumerate() {
-        *pixel = make(Packed(at));
-        at = at.wrapping_add(if x & 1 == 0 { there } else { back });
-    }
-}
-
-/// Like [`run`], with blocks of any 2^`log2` pixels: every four the position is packed anew, so that steps' rounding does not add up.
+/// Like [`run`], with tiles of any 2^`log2` pixels.
 #[inline(always)]
 pub fn any_run<T, const WIDTH: u32, const ROWS: u32>(
-    edges: &mut [Edge],
+    tiles: &mut [Tile],
     out: &mut [T],
     log2: u32,
     offsets: [u32; 2],
     make: impl Fn(Packed<WIDTH, ROWS>) -> T,
 ) {
-    let mut edges = edges.iter_mut();
-    let Some(mut left) = edges.next().map(Edge::advance) else { return };
-    let mut out = out;
-    for edge in edges {
-        let Some((mut pixels, rest)) = out.split_at_mut_checked(1 << log2) else { return };
-        out = rest;
-        let right = edge.advance();
-        let across = |from: u32, to: u32| to.wrapping_sub(from) as i32 >> log2;
-        let [u, v] = [across(left[0], right[0]), across(left[1], right[1])];
-        let step = Packed::<WIDTH, ROWS>::step(left, right, log2);
-        while !pixels.is_empty() {
-            let (four, rest) = pixels.split_at_mut(pixels.len().min(4));
-            pixels = rest;
-            alternate::<_, WIDTH, ROWS>(four, Packed::new(left), step, offsets, &make);
-            left = [left[0].wrapping_add((u as u32).wrapping_shl(2)), left[1].wrapping_add((v as u32).wrapping_shl(2))];
-        }
-        left = right;
+    for (tile, pixels) in tiles.iter_mut().zip(out.chunks_exact_mut(1 << log2.min(TILE_LOG2))) {
+        alternate(pixels, tile.advance(), offsets, &make);
+    }
+}
+
+/// Paints `pixels` from `at` on, `step` further each, moved by one of the offsets in turn.
+#[inline(always)]
+fn alternate<T, const WIDTH: u32, const ROWS: u32>(
+    pixels: &mut [T],
+    [at, step]: [u32; 2],
+    [even, odd]: [u32; 2],
+    make: impl Fn(Packed<WIDTH, ROWS>) -> T,
+) {
+    let turn = odd.wrapping_sub(even);
+    let (there, back) = (step.wrapping_add(turn), step.wrapping_sub(turn));
+    let mut at = at.wrapping_add(even);
+    for (x, pixel) in pixels.iter_mut().enumerate() {
+        *pixel = make(Packed(at));
+        at = at.wrapping_add(if x & 1 == 0 { there } else { back });
     }
 }
 

@@ -20,7 +20,7 @@ use crate::filter::{Bilinear, Dither, Filter, Nearest, mean};
 use crate::fixed::PlayUv;
 use crate::format::TexelKind;
 use crate::pack::{self, Picture, Scratch};
-use crate::plan::{Edge, Run};
+use crate::plan::{Run, Tile};
 use crate::playing::{Look, Playing};
 use crate::span::{self, Packed};
 
@@ -162,7 +162,7 @@ trait Colours {
         &self,
         filter: F,
         run: Run,
-        edges: &mut [Edge],
+        tiles: &mut [Tile],
         out: &mut [u16],
         log2: u32,
     );
@@ -185,8 +185,8 @@ impl<C: Colours, F: Filter> Paint for Lookup<C, F> {
     }
 
     #[inline(always)]
-    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, edges: &mut [Edge], out: &mut [u16], log2: u32) {
-        self.colours.run::<F, WIDTH, ROWS, TEXELS>(self.filter, run, edges, out, log2);
+    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, tiles: &mut [Tile], out: &mut [u16], log2: u32) {
+        self.colours.run::<F, WIDTH, ROWS, TEXELS>(self.filter, run, tiles, out, log2);
     }
 }
 
@@ -220,14 +220,16 @@ impl Colours for Colours8<'_> {
         &self,
         filter: F,
         run: Run,
-        edges: &mut [Edge],
+        tiles: &mut [Tile],
         out: &mut [u16],
         log2: u32,
     ) {
         let from = usize::from(run.row).wrapping_shl(WIDTH);
         // The plan keeps windows inside the picture.
         let Some(window) = self.texture.texels.get(from..).and_then(<[u8]>::first_chunk::<TEXELS>) else { return };
-        paint_run::<_, WIDTH, ROWS>(filter, edges, out, log2, |index| self.entry(window.get(index & (TEXELS - 1)).copied().unwrap_or(0)));
+        paint_run::<_, WIDTH, ROWS>(filter, tiles, out, log2, |index| {
+            self.entry(window.get(index & TEXELS.wrapping_sub(1)).copied().unwrap_or(0))
+        });
     }
 }
 
@@ -235,18 +237,18 @@ impl Colours for Colours8<'_> {
 #[inline(always)]
 fn paint_run<F: Filter, const WIDTH: u32, const ROWS: u32>(
     filter: F,
-    edges: &mut [Edge],
+    tiles: &mut [Tile],
     out: &mut [u16],
     log2: u32,
     colour: impl Fn(usize) -> u16,
 ) {
     let offsets = filter.offsets(WIDTH);
     let make = |at: Packed<WIDTH, ROWS>| filter.packed(at, &colour);
-    // Blocks of four in a picture 512 wide are the rule, and have a loop of their own.
-    if (WIDTH, log2) == (9, 2) {
-        span::run::<_, WIDTH, ROWS, 4>(edges, out, offsets, make);
-    } else {
-        span::any_run(edges, out, log2, offsets, make);
+    // Tiles of four or eight in a picture 512 wide are the rule, and have loops of their own.
+    match (WIDTH, log2) {
+        (9, 2) => span::run::<_, WIDTH, ROWS, 4>(tiles, out, offsets, make),
+        (9, 3) => span::run::<_, WIDTH, ROWS, 8>(tiles, out, offsets, make),
+        _ => span::any_run(tiles, out, log2, offsets, make),
     }
 }
 
@@ -289,13 +291,13 @@ impl Colours4<'_> {
         &self,
         filter: F,
         run: Run,
-        edges: &mut [Edge],
+        tiles: &mut [Tile],
         out: &mut [u16],
         log2: u32,
     ) {
         let from = usize::from(run.row).wrapping_shl(WIDTH) >> 1;
         let Some(window) = self.texture.texels.get(from..).and_then(<[u8]>::first_chunk::<BYTES>) else { return };
-        paint_run::<_, WIDTH, ROWS>(filter, edges, out, log2, |index| self.entry(window, index & (2 * BYTES - 1)));
+        paint_run::<_, WIDTH, ROWS>(filter, tiles, out, log2, |index| self.entry(window, index & BYTES.wrapping_mul(2).wrapping_sub(1)));
     }
 }
 
@@ -314,14 +316,14 @@ impl Colours for Colours4<'_> {
         &self,
         filter: F,
         run: Run,
-        edges: &mut [Edge],
+        tiles: &mut [Tile],
         out: &mut [u16],
         log2: u32,
     ) {
         // Half of TEXELS, which is one of two numbers.
         match TEXELS {
-            0x2000 => self.window::<_, WIDTH, ROWS, 0x1000>(filter, run, edges, out, log2),
-            _ => self.window::<_, WIDTH, ROWS, 0x2000>(filter, run, edges, out, log2),
+            0x2000 => self.window::<_, WIDTH, ROWS, 0x1000>(filter, run, tiles, out, log2),
+            _ => self.window::<_, WIDTH, ROWS, 0x2000>(filter, run, tiles, out, log2),
         }
     }
 }
@@ -373,7 +375,7 @@ impl Colours for ColoursDirect<'_> {
         &self,
         filter: F,
         run: Run,
-        edges: &mut [Edge],
+        tiles: &mut [Tile],
         out: &mut [u16],
         log2: u32,
     ) {
@@ -382,9 +384,9 @@ impl Colours for ColoursDirect<'_> {
         let Some(window) = texels.get(from..).and_then(<[[u8; 2]]>::first_chunk::<TEXELS>) else { return };
         // A loop for either order of bytes.
         if self.swapped {
-            paint_run::<_, WIDTH, ROWS>(filter, edges, out, log2, |index| pixel::<true>(window.get(index & (TEXELS - 1))));
+            paint_run::<_, WIDTH, ROWS>(filter, tiles, out, log2, |index| pixel::<true>(window.get(index & TEXELS.wrapping_sub(1))));
         } else {
-            paint_run::<_, WIDTH, ROWS>(filter, edges, out, log2, |index| pixel::<false>(window.get(index & (TEXELS - 1))));
+            paint_run::<_, WIDTH, ROWS>(filter, tiles, out, log2, |index| pixel::<false>(window.get(index & TEXELS.wrapping_sub(1))));
         }
     }
 }
@@ -439,14 +441,14 @@ impl Colours for AnyColours<'_> {
         &self,
         filter: F,
         run: Run,
-        edges: &mut [Edge],
+        tiles: &mut [Tile],
         out: &mut [u16],
         log2: u32,
     ) {
         match self {
-            Self::Eight(colours) => colours.run::<F, WIDTH, ROWS, TEXELS>(filter, run, edges, out, log2),
-            Self::Four(colours) => colours.run::<F, WIDTH, ROWS, TEXELS>(filter, run, edges, out, log2),
-            Self::Direct(colours) => colours.run::<F, WIDTH, ROWS, TEXELS>(filter, run, edges, out, log2),
+            Self::Eight(colours) => colours.run::<F, WIDTH, ROWS, TEXELS>(filter, run, tiles, out, log2),
+            Self::Four(colours) => colours.run::<F, WIDTH, ROWS, TEXELS>(filter, run, tiles, out, log2),
+            Self::Direct(colours) => colours.run::<F, WIDTH, ROWS, TEXELS>(filter, run, tiles, out, log2),
         }
     }
 }
