@@ -30,10 +30,12 @@ use cubist_core::{AnyTexels, Bundle, Direct565, Indexed4, Indexed8, Texels};
 use cubist_tests::reference::{Pixel, Reference, Weights};
 use cubist_tests::{play, reference, scenes};
 
-/// Pixels whose colour may differ, percent.
-const DIFFERING: f64 = 0.25;
-/// The same where weights are rounded and the oracle's are exact, percent.
-const DIFFERING_IN_TIME: f64 = 0.3;
+/// Pixels whose colour may differ, percent, in tiles of at most four pixels.
+const DIFFERING: f64 = 0.3;
+/// The same in tiles of eight, percent.
+const DIFFERING_IN_EIGHTS: f64 = 0.6;
+/// How much more where weights are rounded and the oracle's are exact, percent.
+const DIFFERING_IN_TIME: f64 = 0.05;
 /// How far a weight of the player may be from the exact one: half a unit, and what Q28 leaves.
 const WEIGHT: f64 = 0.5 / ONE as f64 + 8.0 / (1u32 << 28) as f64;
 
@@ -62,15 +64,29 @@ impl Found {
     }
 }
 
+/// A tile's side, pixels.
+fn side(cell: u32, space: u8) -> u32 {
+    if space == SPACE_CUBIC { cell / 2 } else { cell }.min(8)
+}
+
+/// The side of a bundle's tiles, pixels.
+fn tile(bytes: &[u8]) -> u32 {
+    let path = Bundle::parse(bytes).expect("the baker's bytes parse").path();
+    side(1 << path.cell_log2, path.space)
+}
+
 /// The bounds of one pixel: on positions, texels, and on fields, pixels.
 fn bounds(pixel: &Pixel, cell: u32, space: u8, width_log2: u32, weights: Weights) -> [f64; 2] {
     let unit = 1.0 / f64::from(1u32 << 17);
-    let packed = match width_log2 {
-        9 => 2.0 / 512.0,
-        8 | 10 => 2.0 / 256.0,
+    let steps = match width_log2 {
+        9 => 512.0,
+        8 | 10 => 256.0,
         // No runs there.
-        _ => 0.0,
+        _ => f64::INFINITY,
     };
+    // A position, its steps along both axes and how these change are each rounded to a step, and add up over a tile.
+    let tile = f64::from(side(cell, space));
+    let packed = 0.5 * tile * tile / steps;
     let off = if weights == Weights::Exact { WEIGHT } else { 0.0 };
     let (rounded, spread) = if space == SPACE_CUBIC { (cell / 2 + 7, 25.0 / 16.0) } else { (cell + 2, 1.0) };
     // The slack is what f64 itself rounds.
@@ -131,8 +147,8 @@ fn check(name: &str, bytes: &[u8], frames: impl IntoIterator<Item = u32> + Clone
 /// Like [`check`], by a player of texels that `T` names.
 fn check_as<T: Texels>(name: &str, bytes: &[u8], frames: impl IntoIterator<Item = u32> + Clone) -> Found {
     let round = round_intervals(bytes);
-    let kinds =
-        [("exact", Weights::Exact, if round { DIFFERING } else { DIFFERING_IN_TIME }), ("the player's", Weights::Player, DIFFERING)];
+    let most = if tile(bytes) == 8 { DIFFERING_IN_EIGHTS } else { DIFFERING };
+    let kinds = [("exact", Weights::Exact, if round { most } else { most + DIFFERING_IN_TIME }), ("the player's", Weights::Player, most)];
     let found = kinds.iter().take(if round { 1 } else { 2 }).map(|&(kind, weights, most)| {
         let found = compare::<T>(bytes, frames.clone(), weights, round);
         println!(
