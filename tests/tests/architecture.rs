@@ -25,14 +25,18 @@ const ROOMS: [(&str, &[&str]); 5] = [
 ];
 
 /// The packages, and which of ours each may depend on.
-const PACKAGES: [(&str, &[&str]); 6] = [
+const PACKAGES: [(&str, &[&str]); 7] = [
     ("core", &[]),
     ("baker", &["cubist-core"]),
     ("player-host", &["cubist-core", "cubist-baker"]),
     ("player-mcu/proof", &["cubist-core"]),
     ("player-mcu/qemu", &["cubist-core"]),
     ("player-mcu/bench", &["cubist-core"]),
+    ("player-mcu/pico", &["cubist-core"]),
 ];
+
+/// Where a device leaves no other way: the flash that the Pico's bundles lie in.
+const UNSAFE: &str = "player-mcu/pico/src/slot.rs";
 
 const LONGEST_FILE: usize = 600;
 
@@ -69,7 +73,8 @@ fn nothing_is_unsafe_and_no_lint_is_silenced_without_a_reason() {
     let mut found = Vec::new();
     for source in source::all() {
         let code = source.code();
-        if source::words(&code).any(|(_, word)| word == "unsafe") {
+        let blocks = source::words(&code).filter(|(_, word)| *word == "unsafe").count();
+        if blocks > usize::from(source.path == UNSAFE) {
             found.push(format!("{}: unsafe", source.path));
         }
         if code.contains("#[allow(") || code.contains("#![allow(") {

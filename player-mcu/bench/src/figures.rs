@@ -29,8 +29,34 @@ pub struct Figures {
     pub frames_identical_to_host: u64,
 }
 
+/// The figures of one scene on the Pico. Cycles are without waiting for flash, and those of frames played one after the other; `frames` counts
+/// all that were compared. The static memory is that of the firmware, room for the player included.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct PicoFigures {
+    pub cycles_per_pixel_mean: f64,
+    pub worst_over_mean: f64,
+    pub display: String,
+    pub code_bytes: u64,
+    pub static_ram_bytes: u64,
+    pub stack_peak_bytes: u64,
+    pub working_memory_bytes: u64,
+    pub bundle_bytes: u64,
+    pub frames: u64,
+    pub frames_identical_to_host: u64,
+}
+
+/// What is measured of one scene on one target.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum Measured {
+    /// Instructions, in QEMU.
+    Instructions(Figures),
+    /// Cycles of a Pico.
+    Cycles(PicoFigures),
+}
+
 /// Everything measured: target, then scene.
-pub type Results = BTreeMap<String, BTreeMap<String, Figures>>;
+pub type Results = BTreeMap<String, BTreeMap<String, Measured>>;
 
 /// The figures of `played`, whose pixels must be `expected`.
 ///
@@ -74,7 +100,7 @@ fn solve(sum: impl Fn(fn(&FrameLine) -> u64) -> f64) -> (f64, f64) {
     if determinant > 0.0 { ((sc * tt - tc * st) / determinant, (tc * ss - sc * st) / determinant) } else { (sc / ss.max(1.0), 0.0) }
 }
 
-fn round(x: f64) -> f64 {
+pub fn round(x: f64) -> f64 {
     (x * 1000.0).round() / 1000.0
 }
 
@@ -92,8 +118,30 @@ pub fn write_table(readme: &Path, results: &Results) -> Result<()> {
     let mut table = String::from(
         "\n| target | scene | instr/px | worst / mean | keys | loading | drawing | smooth, per smooth px | torn, per torn px | torn | working memory | stack | code |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
+    let mut pico = String::new();
     for (target, scenes) in results {
         for (scene, f) in scenes {
+            let f = match f {
+                Measured::Instructions(f) => f,
+                Measured::Cycles(f) => {
+                    if pico.is_empty() {
+                        pico += "\n| target | scene | display | cycles/px | worst / mean | frames identical to host | working memory | static RAM | stack | code |\n|---|---|---|---|---|---|---|---|---|---|\n";
+                    }
+                    pico += &format!(
+                        "| {target} | {scene} | {} | **{:.2}** | {:.2} | {} of {} | {} B | {} B | {} B | {} B |\n",
+                        f.display,
+                        f.cycles_per_pixel_mean,
+                        f.worst_over_mean,
+                        f.frames_identical_to_host,
+                        f.frames,
+                        f.working_memory_bytes,
+                        f.static_ram_bytes,
+                        f.stack_peak_bytes,
+                        f.code_bytes,
+                    );
+                    continue;
+                }
+            };
             table += &format!(
                 "| {target} | {scene} | **{:.2}** | {:.2} | {:.2} | {:.2} | {:.2} | {:.1} | {:.1} | {:.1} % | {} B | {} B | {} B |\n",
                 f.instructions_per_pixel_mean,
@@ -110,5 +158,5 @@ pub fn write_table(readme: &Path, results: &Results) -> Result<()> {
             );
         }
     }
-    fs::write(readme, format!("{before}{BEGIN}\n{table}\n{END}{after}")).with_context(|| readme.display().to_string())
+    fs::write(readme, format!("{before}{BEGIN}\n{table}{pico}\n{END}{after}")).with_context(|| readme.display().to_string())
 }

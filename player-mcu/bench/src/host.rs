@@ -1,7 +1,7 @@
-//! The same bundle on the host: the checksums that every device's pixels must have.
+//! The same bundle on the host: the checksums that every device's pixels must have, or the pixels themselves. They go to `figures` and `pico`.
 
 use anyhow::{Context, Result};
-use cubist_core::{Bundle, Frame, Player};
+use cubist_core::{AnyTexels, Bundle, Frame, Player};
 use std::fs;
 use std::path::Path;
 
@@ -18,19 +18,49 @@ pub struct Expected {
 /// # Errors
 /// A file that cannot be read, or is no bundle.
 pub fn play(file: &Path) -> Result<Expected> {
+    let mut checksums = Vec::new();
+    let mut sum = 0;
+    let (pixels, bytes) = rows(file, |y, row| {
+        if y == 0 {
+            checksums.push(0);
+            sum = 0x811c_9dc5;
+        }
+        sum = row.iter().fold(sum, |sum: u32, &pixel| (sum ^ u32::from(pixel)).wrapping_mul(0x0100_0193));
+        checksums.last_mut().into_iter().for_each(|last| *last = sum);
+    })?;
+    Ok(Expected { pixels, checksums, bytes })
+}
+
+/// What a device shows of the bundle in `file`: width, height, and all frames as RGB565, little-endian, one after the other.
+///
+/// # Errors
+/// Those of [`play`].
+pub fn frames(file: &Path) -> Result<((u32, u32), Vec<u8>)> {
+    let mut all = Vec::new();
+    let mut width = 0;
+    let mut height = 0;
+    rows(file, |y, row| {
+        (width, height) = (row.len() as u32, height.max(y + 1));
+        all.extend(row.iter().flat_map(|pixel| pixel.to_le_bytes()));
+    })?;
+    Ok(((width, height), all))
+}
+
+/// Hands out every row of every frame of the bundle in `file`, with its number; the pixels of a frame come back, and the bytes of the bundle.
+fn rows(file: &Path, mut take: impl FnMut(u32, &[u16])) -> Result<(u64, u64)> {
     let place = || file.display().to_string();
     let bytes = fs::read(file).with_context(place)?;
     let bundle = Bundle::parse(&bytes).map_err(|error| anyhow::anyhow!("{}: {error}", place()))?;
     let mut memory = vec![0; bundle.memory_needed()];
-    let mut player = Player::new(&bundle, &mut memory).map_err(|error| anyhow::anyhow!("{}: {error}", place()))?;
+    let mut player = Player::<AnyTexels>::with_texels(&bundle, &mut memory).map_err(|error| anyhow::anyhow!("{}: {error}", place()))?;
     let (width, height) = bundle.size();
     let mut row = vec![0; width as usize];
-    let checksums = (0..bundle.frames()).map(|frame| {
+    for frame in 0..bundle.frames() {
         player.seek(Frame(frame));
-        (0..height).fold(0x811c_9dc5, |sum: u32, y| {
+        for y in 0..height {
             player.row(y, &mut row);
-            row.iter().fold(sum, |sum, &pixel| (sum ^ u32::from(pixel)).wrapping_mul(0x0100_0193))
-        })
-    });
-    Ok(Expected { pixels: u64::from(width * height), checksums: checksums.collect(), bytes: bytes.len() as u64 })
+            take(y, &row);
+        }
+    }
+    Ok((u64::from(width * height), bytes.len() as u64))
 }
