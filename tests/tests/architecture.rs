@@ -25,13 +25,17 @@ const ROOMS: [(&str, &[&str]); 5] = [
 ];
 
 /// The packages, and which of ours each may depend on.
-const PACKAGES: [(&str, &[&str]); 6] = [
+const PACKAGES: [(&str, &[&str]); 10] = [
     ("core", &[]),
     ("baker", &["cubist-core"]),
     ("player-host", &["cubist-core", "cubist-baker"]),
     ("player-mcu/proof", &["cubist-core"]),
     ("player-mcu/qemu", &["cubist-core"]),
     ("player-mcu/bench", &["cubist-core"]),
+    ("player-mcu/identity", &["cubist-core"]),
+    ("player-mcu/identity/device", &["cubist-identity"]),
+    ("player-mcu/identity/wasm", &["cubist-identity"]),
+    ("player-mcu/identity/host", &["cubist-identity"]),
 ];
 
 const LONGEST_FILE: usize = 600;
