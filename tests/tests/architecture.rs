@@ -25,7 +25,7 @@ const ROOMS: [(&str, &[&str]); 5] = [
 ];
 
 /// The packages, and which of ours each may depend on.
-const PACKAGES: [(&str, &[&str]); 10] = [
+const PACKAGES: [(&str, &[&str]); 12] = [
     ("core", &[]),
     ("baker", &["cubist-core"]),
     ("player-host", &["cubist-core", "cubist-baker"]),
@@ -36,6 +36,8 @@ const PACKAGES: [(&str, &[&str]); 10] = [
     ("player-mcu/identity/device", &["cubist-identity"]),
     ("player-mcu/identity/wasm", &["cubist-identity"]),
     ("player-mcu/identity/host", &["cubist-identity"]),
+    ("player-mcu/peers", &["cubist-core"]),
+    ("player-mcu/peers/host", &["cubist-core"]),
 ];
 
 const LONGEST_FILE: usize = 600;
