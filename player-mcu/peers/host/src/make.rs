@@ -4,7 +4,7 @@
 use crate::decode;
 use crate::figures::Expected;
 use crate::screen::{HEIGHT, PIXELS, WIDTH, cut, nearest, psnr, sum};
-use crate::warp::{self, Cell, NODE_ROWS, NODES};
+use crate::warp::{self, Cells, NODE_ROWS, NODES};
 use anyhow::{Context, Result, anyhow, ensure};
 use cubist_core::{Bundle, Frame, Player};
 use embedded_graphics_core::pixelcolor::{IntoStorage, Rgb565, Rgb888};
@@ -113,13 +113,13 @@ fn warp() -> (Vec<u8>, Vec<Vec<u16>>) {
             let (x, y) = ((x - 20.0) * (1.0 + 0.01 * y), y - 15.0);
             // Positions stay inside of the texture; 8.8 each.
             let [u, v] = [x * turn.cos() - y * turn.sin(), x * turn.sin() + y * turn.cos()].map(|at| ((128.0 + 3.0 * at) * 256.0) as u32);
-            v << 16 | u
+            u << 16 | v
         };
         let rows: Vec<[u32; NODES]> = (0..NODE_ROWS).map(|y| std::array::from_fn(|x| node(x as f64, y as f64))).collect();
         content.extend(rows.iter().flatten().flat_map(|node| node.to_le_bytes()));
         let mut picture = Vec::with_capacity(PIXELS);
         for pair in rows.windows(2) {
-            let (mut cells, mut out) = ([Cell::NEW; 40], [0; 160]);
+            let (mut cells, mut out) = (Cells::NEW, [0; 160]);
             warp::set_up(&pair[0], &pair[1], &mut cells);
             for _ in 0..8 {
                 warp::row(&mut cells, &texels, &palette, &mut out);

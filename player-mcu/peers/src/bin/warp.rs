@@ -7,11 +7,11 @@ mod warp;
 
 use cortex_m_rt::entry;
 use cubist_peers::{clock, content, end, fail, frame};
-use warp::{Cell, NODE_ROWS, NODES, row, set_up};
+use warp::{Cells, NODE_ROWS, NODES, row, set_up};
 
 #[entry]
 fn main() -> ! {
-    static mut CELLS: [Cell; 40] = [Cell::NEW; 40];
+    static mut CELLS: Cells = Cells::NEW;
     static mut ROW: [u32; 160] = [0; 160];
     let mut clock = clock();
     let content: &'static [u8] = content!("warp.raw");
