@@ -16,7 +16,7 @@ pub struct Expected {
     /// The sum of every frame's pixels.
     pub sums: Vec<u32>,
     /// The mean over the frames that the truth has; none where there is nothing to compare with.
-    pub psnr_db: f64,
+    pub psnr_db: Option<f64>,
     /// Bytes of all frames.
     pub content_bytes: u64,
 }
@@ -45,8 +45,13 @@ pub struct Figures {
     pub stack_peak_bytes: u64,
     pub code_bytes: u64,
     pub content_bytes_per_frame: f64,
-    pub psnr_db: f64,
+    pub psnr_db: Option<f64>,
     pub frames: u64,
+}
+
+/// A PSNR as a line ends with it; nothing where there is none.
+pub fn decibels(psnr: Option<f64>) -> String {
+    psnr.map_or(String::new(), |db| format!(", {db:.2} dB"))
 }
 
 /// Everything measured: target, then player.
@@ -73,7 +78,7 @@ pub fn figures(played: &Played, expected: &Expected, code_bytes: u64, static_byt
         stack_peak_bytes: played.stack_peak_bytes,
         code_bytes,
         content_bytes_per_frame: round(expected.content_bytes as f64 / count),
-        psnr_db: round(expected.psnr_db),
+        psnr_db: expected.psnr_db.map(round),
         frames: played.frames.len() as u64,
     })
 }
@@ -101,8 +106,7 @@ pub fn write_table(readme: &Path, results: &Results) -> Result<()> {
     );
     for row in rows {
         let each = |cell: fn(&Figures) -> String| row.iter().map(|&figures| cell(figures)).collect::<Vec<_>>();
-        // Nothing to compare the pixels with.
-        let psnr = if row[0].psnr_db == 0.0 { "".to_owned() } else { format!("{:.2} dB", row[0].psnr_db) };
+        let psnr = row[0].psnr_db.map_or(String::new(), |db| format!("{db:.2} dB"));
         table += &format!(
             "| {} | {} | {} | {} | {:.0} | {psnr} |\n",
             row[0].what,

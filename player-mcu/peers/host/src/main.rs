@@ -27,8 +27,12 @@ fn main() -> Result<()> {
             let found =
                 figures::figures(&played, &expected, code.parse()?, fixed.parse()?).with_context(|| format!("{player} on {target}"))?;
             println!(
-                "{target:<14} {player:<11} {:7.2} instructions a pixel; RAM {}, code {}, content {:.0} a frame, {:.2} dB",
-                found.instructions_per_pixel_mean, found.ram_bytes, found.code_bytes, found.content_bytes_per_frame, found.psnr_db
+                "{target:<14} {player:<11} {:7.2} instructions a pixel; RAM {}, code {}, content {:.0} a frame{}",
+                found.instructions_per_pixel_mean,
+                found.ram_bytes,
+                found.code_bytes,
+                found.content_bytes_per_frame,
+                figures::decibels(found.psnr_db)
             );
             let mut all: Results = match fs::read(results) {
                 Ok(text) => serde_json::from_slice(&text).with_context(|| (*results).to_owned())?,

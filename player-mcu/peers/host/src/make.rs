@@ -2,7 +2,7 @@
 //! build, sums and PSNR to `figures`.
 
 use crate::decode;
-use crate::figures::Expected;
+use crate::figures::{Expected, decibels};
 use crate::screen::{HEIGHT, PIXELS, WIDTH, cut, nearest, psnr, sum};
 use crate::warp::{self, Cells, NODE_ROWS, NODES};
 use anyhow::{Context, Result, anyhow, ensure};
@@ -38,14 +38,14 @@ pub fn all(truth: &Path, bundle: &Path, frames: u32, folder: &Path) -> Result<()
     let [played, cubist] = played(&bytes, frames, truth.len())?;
     write("clip.cubist", &bytes)?;
     let cubist = Expected::of(&played, &cubist, &truth, bytes.len(), "**Cubist**");
-    let asked = cubist.psnr_db;
+    let asked = cubist.psnr_db.context("a frame at least")?;
     expected.insert("cubist", cubist);
 
     let (content, pictures) = warp();
     write("warp.raw", &content)?;
     let of_frame = content.len() - (1 << 16) - 512;
     let what = "a bare warp of 8-pixel cells, no scene";
-    expected.insert("warp", Expected { psnr_db: 0.0, ..Expected::of(&pictures, &[], &[], of_frame, what) });
+    expected.insert("warp", Expected::of(&pictures, &[], &[], of_frame, what));
 
     let file = gif(&truth)?;
     write("clip.gif", &file)?;
@@ -68,9 +68,9 @@ pub fn all(truth: &Path, bundle: &Path, frames: u32, folder: &Path) -> Result<()
 
     for (player, expected) in &expected {
         println!(
-            "{player:<11} {:8.0} bytes a frame, {:.2} dB",
+            "{player:<11} {:8.0} bytes a frame{}",
             expected.content_bytes as f64 / expected.sums.len() as f64,
-            expected.psnr_db
+            decibels(expected.psnr_db)
         );
     }
     write("expected.json", serde_json::to_string(&expected)?.as_bytes())
@@ -189,7 +189,7 @@ fn mean(values: impl ExactSizeIterator<Item = f64>) -> f64 {
 impl Expected {
     /// Of what comes out of a player pixel by pixel, and of what then stands on the screen in the frames that the truth has.
     fn of(streams: &[Vec<u16>], pictures: &[Vec<u16>], truth: &[&[u8]], content_bytes: usize, what: &str) -> Self {
-        let psnr_db = mean(pictures.iter().zip(truth).map(|(picture, truth)| psnr(picture, truth)));
+        let psnr_db = (!truth.is_empty()).then(|| mean(pictures.iter().zip(truth).map(|(picture, truth)| psnr(picture, truth))));
         let sums = streams.iter().map(|pixels| sum(pixels.iter().copied())).collect();
         Self { what: what.to_owned(), sums, psnr_db, content_bytes: content_bytes as u64 }
     }
