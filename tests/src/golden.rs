@@ -21,13 +21,21 @@ pub fn file(name: &str) -> PathBuf {
     [env!("CARGO_MANIFEST_DIR"), "..", "fixtures", "golden", &format!("{name}.json")].iter().collect()
 }
 
+/// The bundle of scene `name` that its golden is about: baked at the reduced setting.
+///
+/// # Errors
+/// Those of the baker.
+pub fn bundle(name: &str) -> Result<Vec<u8>> {
+    scenes::bundle(name, scenes::SIZE, scenes::FRAMES, &Settings::default())
+}
+
 /// Bakes and plays scene `name` at the reduced setting: length and CRC-32 of the bundle, CRC-32 of the pixels of
 /// [`SHOWN`] (RGB565, little-endian, row by row).
 ///
 /// # Errors
 /// Those of the baker.
 pub fn make(name: &str) -> Result<Value> {
-    let bytes = scenes::bundle(name, scenes::SIZE, scenes::FRAMES, &Settings::default())?;
+    let bytes = bundle(name)?;
     let mut frames = Map::new();
     play::visit(&bytes, SHOWN, |frame, player| {
         let pixels: Vec<u8> = play::pixels(player).into_iter().flat_map(u16::to_le_bytes).collect();

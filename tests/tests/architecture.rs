@@ -25,7 +25,7 @@ const ROOMS: [(&str, &[&str]); 5] = [
 ];
 
 /// The packages, and which of ours each may depend on.
-const PACKAGES: [(&str, &[&str]); 7] = [
+const PACKAGES: [(&str, &[&str]); 13] = [
     ("core", &[]),
     ("baker", &["cubist-core"]),
     ("player-host", &["cubist-core", "cubist-baker"]),
@@ -33,6 +33,12 @@ const PACKAGES: [(&str, &[&str]); 7] = [
     ("player-mcu/qemu", &["cubist-core"]),
     ("player-mcu/bench", &["cubist-core"]),
     ("player-mcu/pico", &["cubist-core"]),
+    ("player-mcu/identity", &["cubist-core"]),
+    ("player-mcu/identity/device", &["cubist-identity"]),
+    ("player-mcu/identity/wasm", &["cubist-identity"]),
+    ("player-mcu/identity/host", &["cubist-identity"]),
+    ("player-mcu/peers", &["cubist-core"]),
+    ("player-mcu/peers/host", &["cubist-core"]),
 ];
 
 /// Where a device leaves no other way: the flash that the Pico's bundles lie in.

@@ -71,8 +71,8 @@ fn side(cell: u32, space: u8) -> u32 {
 
 /// The side of a bundle's tiles, pixels.
 fn tile(bytes: &[u8]) -> u32 {
-    let path = Bundle::parse(bytes).expect("the baker's bytes parse").path();
-    side(1 << path.cell_log2, path.space)
+    let bundle = Bundle::parse(bytes).expect("the baker's bytes parse");
+    side(1 << bundle.path().cell_log2, bundle.path().space)
 }
 
 /// The bounds of one pixel: on positions, texels, and on fields, pixels.
