@@ -27,6 +27,23 @@ pub struct Figures {
     pub bundle_bytes: u64,
     pub frames: u64,
     pub frames_identical_to_host: u64,
+    /// Of firmwares that draw rows in other ways.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub other_rows: BTreeMap<String, OtherRows>,
+}
+
+/// What another way to draw rows costs.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct OtherRows {
+    pub instructions_per_pixel_mean: f64,
+    pub firmware_code_bytes: u64,
+}
+
+impl From<&Figures> for OtherRows {
+    fn from(figures: &Figures) -> Self {
+        let &Figures { instructions_per_pixel_mean, firmware_code_bytes, .. } = figures;
+        Self { instructions_per_pixel_mean, firmware_code_bytes }
+    }
 }
 
 /// The figures of one scene on the Pico. Cycles are without waiting for flash, and those of frames played one after the other; `frames` counts
@@ -89,6 +106,7 @@ pub fn figures(played: &Played, expected: &Expected, firmware_code_bytes: u64) -
         bundle_bytes: expected.bytes,
         frames: played.frames.len() as u64,
         frames_identical_to_host: played.frames.len() as u64,
+        other_rows: BTreeMap::new(),
     })
 }
 
@@ -118,7 +136,7 @@ pub fn write_table(readme: &Path, results: &Results) -> Result<()> {
     let mut table = String::from(
         "\n| target | scene | instr/px | worst / mean | keys | loading | drawing | smooth, per smooth px | torn, per torn px | torn | working memory | stack | code |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
-    let mut pico = String::new();
+    let (mut pico, mut rows) = (String::new(), String::new());
     for (target, scenes) in results {
         for (scene, f) in scenes {
             let f = match f {
@@ -142,6 +160,15 @@ pub fn write_table(readme: &Path, results: &Results) -> Result<()> {
                     continue;
                 }
             };
+            for (kind, other) in &f.other_rows {
+                if rows.is_empty() {
+                    rows += "\n| target | scene | rows | instr/px | code |\n|---|---|---|---|---|\n";
+                }
+                rows += &format!(
+                    "| {target} | {scene} | {kind} | **{:.2}** | {} B |\n",
+                    other.instructions_per_pixel_mean, other.firmware_code_bytes
+                );
+            }
             table += &format!(
                 "| {target} | {scene} | **{:.2}** | {:.2} | {:.2} | {:.2} | {:.2} | {:.1} | {:.1} | {:.1} % | {} B | {} B | {} B |\n",
                 f.instructions_per_pixel_mean,
@@ -158,5 +185,5 @@ pub fn write_table(readme: &Path, results: &Results) -> Result<()> {
             );
         }
     }
-    fs::write(readme, format!("{before}{BEGIN}\n{table}{pico}\n{END}{after}")).with_context(|| readme.display().to_string())
+    fs::write(readme, format!("{before}{BEGIN}\n{table}{rows}{pico}\n{END}{after}")).with_context(|| readme.display().to_string())
 }

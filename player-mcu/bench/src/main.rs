@@ -3,6 +3,8 @@
 //! `cubist-mcu TARGET SCENE FIRMWARE BUNDLE CODE_BYTES RESULTS README` plays a firmware in QEMU, holds every frame's pixels against the host's, and
 //! puts the figures into RESULTS (JSON: target, then scene) and the tables of README.
 //! `cubist-mcu rp2040 SCENE FIRMWARE BUNDLE CODE_BYTES RAM_BYTES DISPLAY EMULATOR RESULTS README` does the same with a Pico's.
+//! `cubist-mcu rows KIND TARGET SCENE FIRMWARE BUNDLE CODE_BYTES RESULTS README` does it with a firmware that draws its rows in another way.
+//! Figures above what `limits.json` allows are errors, once they are written.
 //! `cubist-mcu frames BUNDLE OUT` writes the host's frames, for the emulator, and prints their size.
 //! `cubist-mcu card WIDTHxHEIGHT OUT` writes the test card's scene, for the baker, into the folder OUT.
 
@@ -10,6 +12,7 @@ mod card;
 mod figures;
 mod font;
 mod host;
+mod limits;
 mod pico;
 mod qemu;
 
@@ -45,7 +48,8 @@ fn main() -> Result<()> {
         }
         [target, scene, firmware, bundle, code, results, readme] => {
             let played = with_scratch(|scratch| qemu::play(Path::new(firmware), scratch));
-            let found = host::play(Path::new(bundle)).and_then(|expected| figures::figures(&played?, &expected, code.parse()?));
+            let expected = host::play(Path::new(bundle), |player, y, out| player.row(y, out));
+            let found = expected.and_then(|expected| figures::figures(&played?, &expected, code.parse()?));
             let found = found.with_context(|| format!("{scene} on {target}"))?;
             println!(
                 "{target:<14} {scene:<12} {:6.2} instructions a pixel, worst {:.2} of the mean: keys {:.2}, loading {:.2}, drawing {:.2} (smooth {:.2}, torn {:.2} at {:.1} %); stack {}",
@@ -61,8 +65,20 @@ fn main() -> Result<()> {
             );
             write(target, scene, Measured::Instructions(found), results, readme)?;
         }
+        ["rows", kind, target, scene, firmware, bundle, code, results, readme] => {
+            let played = with_scratch(|scratch| qemu::play(Path::new(firmware), scratch));
+            let expected = host::way(kind).and_then(|row| host::play(Path::new(bundle), row));
+            let found = expected.and_then(|expected| figures::figures(&played?, &expected, code.parse()?));
+            let found = found.with_context(|| format!("{scene} on {target}, {kind} rows"))?;
+            println!("{target:<14} {scene:<12} {:6.2} instructions a pixel, {kind} rows", found.instructions_per_pixel_mean);
+            let mut all = read(results)?;
+            let scenes = all.get_mut(target).and_then(|scenes| scenes.get_mut(scene));
+            let Some(Measured::Instructions(plain)) = scenes else { bail!("{results}: {scene} is to be played on {target} first") };
+            plain.other_rows.insert(kind.to_owned(), figures::OtherRows::from(&found));
+            write_all(&all, results, readme)?;
+        }
         _ => bail!(
-            "usage: cubist-mcu TARGET SCENE FIRMWARE BUNDLE CODE_BYTES RESULTS README\n       cubist-mcu rp2040 SCENE FIRMWARE BUNDLE CODE_BYTES RAM_BYTES DISPLAY EMULATOR RESULTS README\n       cubist-mcu frames BUNDLE OUT\n       cubist-mcu card WIDTHxHEIGHT OUT"
+            "usage: cubist-mcu TARGET SCENE FIRMWARE BUNDLE CODE_BYTES RESULTS README\n       cubist-mcu rp2040 SCENE FIRMWARE BUNDLE CODE_BYTES RAM_BYTES DISPLAY EMULATOR RESULTS README\n       cubist-mcu rows KIND TARGET SCENE FIRMWARE BUNDLE CODE_BYTES RESULTS README\n       cubist-mcu frames BUNDLE OUT\n       cubist-mcu card WIDTHxHEIGHT OUT"
         ),
     }
     Ok(())
@@ -79,11 +95,23 @@ fn with_scratch<T>(task: impl FnOnce(&Path) -> Result<T>) -> Result<T> {
 
 /// Puts `measured` in the place of what RESULTS and README have.
 fn write(target: &str, scene: &str, measured: Measured, results: &str, readme: &str) -> Result<()> {
-    let mut all: Results = match fs::read(results) {
-        Ok(text) => serde_json::from_slice(&text).with_context(|| results.to_owned())?,
-        Err(_) => Results::new(),
-    };
+    let mut all = read(results)?;
+    let checked = limits::check(Path::new("limits.json"), target, scene, &measured);
     all.entry(target.to_owned()).or_default().insert(scene.to_owned(), measured);
-    fs::write(results, serde_json::to_string_pretty(&all)? + "\n").with_context(|| results.to_owned())?;
-    figures::write_table(Path::new(readme), &all)
+    write_all(&all, results, readme)?;
+    checked
+}
+
+/// What RESULTS has; nothing where there is no such file.
+fn read(results: &str) -> Result<Results> {
+    match fs::read(results) {
+        Ok(text) => serde_json::from_slice(&text).with_context(|| results.to_owned()),
+        Err(_) => Ok(Results::new()),
+    }
+}
+
+/// Writes RESULTS and README's tables.
+fn write_all(all: &Results, results: &str, readme: &str) -> Result<()> {
+    fs::write(results, serde_json::to_string_pretty(all)? + "\n").with_context(|| results.to_owned())?;
+    figures::write_table(Path::new(readme), all)
 }
