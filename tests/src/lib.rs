@@ -5,6 +5,7 @@
 pub mod codecs;
 pub mod figures;
 pub mod golden;
+pub mod hard;
 pub mod partitions;
 pub mod play;
 pub mod random;
