@@ -143,7 +143,7 @@ cases! {
     a_fence_at_the_cells_frequency: 0.0, 100.0, 999.0;
     t_junctions: 0.0, 100.0, 999.0;
     four_sheets_in_a_cell: 0.0, 100.0, 999.0;
-    a_sheet_between_two_keys: 0.0, 100.0, 999.0;
+    a_sheet_between_two_keys: 0.0, 100.0, 999.0, it_is_seen_between_keys_only;
     a_moebius_strip: 0.0, 100.0, 999.0;
     a_soup: 0.0, 100.0, 999.0;
     a_cut: 0.0, 100.0, 999.0;
@@ -204,4 +204,17 @@ fn nothing_flickers(baked: &Baked, _: &Figures) {
     let changes = frames.windows(2).map(|pair| pair[0].iter().zip(&pair[1]).filter(|(a, b)| a != b).count());
     let most = changes.max().unwrap_or(0);
     assert!(200 * most <= frames[0].len(), "{most} of {} pixels change", frames[0].len());
+}
+
+/// The board behind the slit is seen in some frames and in none that a key stands at.
+fn it_is_seen_between_keys_only(baked: &Baked, _: &Figures) {
+    let board = baked.scene.triangles.len() as u32 - 2;
+    let (mut pixel, mut seen) = (0, vec![0; baked.scene.playback.frames as usize]);
+    let screen = baked.scene.playback.width as usize * baked.scene.playback.height as usize;
+    hits(baked, |_, _, hit| {
+        seen[pixel / screen] += usize::from(hit.is_some_and(|triangle| triangle >= board));
+        pixel += 1;
+    });
+    assert!(seen.iter().any(|&pixels| pixels > 8), "it is not seen: {seen:?}");
+    assert!(baked.encoded.grid.keys.iter().all(|&key| seen[key as usize] == 0), "it is seen at a key: {:?}, {seen:?}", baked.encoded.grid.keys);
 }

@@ -1,7 +1,8 @@
 //! Scenes that are hard on outlines: those that roll over curved surfaces, degenerate to a line or a point, or are as fine as the grid.
 //! Made by `build`; listed, with the reasons, in `super`.
 
-use super::build::{Build, look, orbit, sphere};
+use super::build::{Build, FOV, look, orbit, sphere};
+use cubist_baker::camera::Pose;
 use cubist_baker::scene::Scene;
 use glam::DVec3;
 use libm::sincos;
@@ -15,7 +16,10 @@ pub fn the_apex_of_a_cone() -> Scene {
         DVec3::new(t * side, 1.5 - 1.5 * t, t * front)
     });
     build.quad(3, DVec3::new(-4.0, 0.0, -4.0), DVec3::X * 8.0, DVec3::Z * 8.0);
-    build.finish("the-apex-of-a-cone", |s| look(DVec3::new(2.4 * (s - 0.5), 4.0, 0.9 * (s - 0.5) + 1e-3), DVec3::new(0.0, 0.8, 0.0)))
+    build.finish("the-apex-of-a-cone", |s| {
+        let eye = DVec3::new(2.4 * (s - 0.5), 4.0, 0.9 * (s - 0.5));
+        Pose::look_at(eye, DVec3::new(0.0, 0.8, 0.0), DVec3::NEG_Z, FOV)
+    })
 }
 
 /// A lump whose silhouette moves over it and changes its shape all the time: its aspect graph has no end.
