@@ -104,6 +104,7 @@ fn what_is_wrong_is_said_with_place_and_cure() {
         (vec![text("b.obj", "")], &["b.obj"], vec!["b.obj", "no triangles"]),
         (vec![File("t.png", bomb(60_000)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], &["b.obj"], vec!["t.png"]),
         (vec![File("t.png", bomb(2_000)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], &["b.obj"], vec!["t.png"]),
+        (vec![File("t.png", png(100_000, 1)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], &["b.obj"], vec!["material \"m\"", "t.png", "too large", "16384"]),
         (vec![File("t.png", b"no picture".to_vec()), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], &["b.obj"], vec!["t.png", "not a picture"]),
         (vec![], &["https://example.com/a.glb"], vec!["https://example.com/a.glb", "download it"]),
         (vec![], &["none.glb"], vec!["none.glb", "no such file", "check the path"]),
@@ -160,8 +161,8 @@ fn a_file_that_may_not_be_read_is_said() {
 fn what_is_odd_but_right_bakes() {
     let cases: Vec<(Vec<File>, &str, &[&str])> = vec![
         (vec![File("t.png", png(1, 1)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], "b.obj", &["--size", "32x24", "--frames", "3"]),
-        (vec![File("t.png", png(100_000, 1)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], "b.obj", &["--size", "32x24", "--frames", "3"]),
-        (vec![File("t.png", png(1, 60_000)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], "b.obj", &["--size", "32x24", "--frames", "3"]),
+        (vec![File("t.png", png(16_384, 1)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], "b.obj", &["--size", "32x24", "--frames", "3"]),
+        (vec![File("t.png", png(1, 16_384)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], "b.obj", &["--size", "32x24", "--frames", "3"]),
         (vec![], "a.obj", &["--size", "1x1", "--frames", "1"]),
         (vec![], "a.obj", &["--size", "2000x2000", "--frames", "1"]),
         (vec![], "a.obj", &["--size", "37x23", "--frames", "5"]),

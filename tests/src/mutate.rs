@@ -84,7 +84,10 @@ impl Edit {
             4 => Self::First(byte(random)),
             5..=7 => Self::Limit(byte(random), number(random)),
             8 => Self::Header(byte(random), number(random)),
-            9 => Self::Frames(random.below(1 << random.below(25)) as u32),
+            9 => {
+                let bits = random.below(25);
+                Self::Frames(random.below(1 << bits) as u32)
+            }
             10 | 11 => Self::Key { at: byte(random), what: byte(random), by: random.below(9) as i16 - 4 },
             12..=14 => Self::Label(byte(random), byte(random), number(random)),
             15 => Self::Image(byte(random), number(random)),
@@ -100,12 +103,12 @@ type Own = ([u8; 4], bool, Vec<u8>);
 /// `bytes` with `edits`, sealed; `None` where they hold no envelope.
 #[must_use]
 pub fn mutated(bytes: &[u8], edits: &[Edit]) -> Option<Vec<u8>> {
-    let mut envelope: Envelope<'_> = postcard::take_from_bytes(bytes).ok()?.0;
+    let envelope: Envelope<'_> = postcard::take_from_bytes(bytes).ok()?.0;
     let mut sections: Vec<Own> = envelope.sections.iter().map(|own| (own.tag, own.required, own.bytes.to_vec())).collect();
     for edit in edits {
         apply(&mut sections, *edit);
     }
-    envelope.sections.clear();
+    let mut envelope = Envelope { magic: envelope.magic, version: envelope.version, sections: Default::default() };
     for (tag, required, bytes) in &sections {
         envelope.sections.push(Section { tag: *tag, required: *required, bytes }).ok()?;
     }

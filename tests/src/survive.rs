@@ -40,7 +40,7 @@ fn play(bundle: &Bundle<'_>, fill: u8, dose: Dose) -> Vec<u16> {
     for frame in [0, bundle.frames() / 2, bundle.frames() - 1] {
         for frame in frame.saturating_sub(dose.walk)..=frame {
             player.seek(Frame(frame));
-            bounded(bundle, player.work(), 0, 0);
+            bounded(bundle, player.work(), 0);
         }
         let mut drawn = 0;
         for y in (0..height).step_by(height.div_ceil(dose.rows.max(1)) as usize) {
@@ -53,15 +53,15 @@ fn play(bundle: &Bundle<'_>, fill: u8, dose: Dose) -> Vec<u16> {
             drawn += 2;
             pixels.extend_from_slice(&row);
         }
-        bounded(bundle, player.work(), drawn, width as u32);
+        bounded(bundle, player.work(), drawn);
         player.smooth_row(height / 2, &mut row);
         pixels.extend_from_slice(&row);
     }
     pixels
 }
 
-/// Checks that `rows` rows of `width` pixels, and the seek before them, took no more work than the header says.
-fn bounded(bundle: &Bundle<'_>, work: Work, rows: u32, width: u32) {
+/// Checks that `rows` rows, and the seek before them, took no more work than the header says.
+fn bounded(bundle: &Bundle<'_>, work: Work, rows: u32) {
     let (limits, path) = (bundle.limits(), bundle.path());
     let grid = Grid::new(path.width, path.height, path.cell_log2);
     let keys = u32::from(limits.seek_keys);
@@ -70,7 +70,8 @@ fn bounded(bundle: &Bundle<'_>, work: Work, rows: u32, width: u32) {
     // The longest record, and what the decoder reads ahead of each.
     let record = (0..bundle.key_count()).map(|key| bundle.record(key).len()).max().unwrap_or(0) as u32 + 8;
     let layers = u32::from(limits.row_layers);
-    let pixels = rows * width;
+    // A row counts whole, however much of it is asked for.
+    let pixels = rows * u32::from(path.width);
     let good = [
         ("keys", work.keys, keys),
         ("slices", work.slices, (keys + 1).saturating_mul(slices)),

@@ -8,7 +8,7 @@ use cubist_baker::encode::{self, CodingSettings, Content, Header};
 use cubist_baker::gbuffer::GBuffer;
 use cubist_baker::sheets::{self, KeyGrid, Layers};
 use cubist_baker::{fields, fit, order};
-use cubist_core::format::{SPACE_CUBIC, TexelKind};
+use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC, TexelKind};
 
 /// A screen all of one label, and how it is played.
 #[derive(Clone, Copy, Debug)]
@@ -27,11 +27,22 @@ pub struct Synthetic {
     pub looping: bool,
     /// Every so many keys one needs no earlier one.
     pub independent_every: usize,
+    /// How the bundle holds the source image.
+    pub storage: Storage,
 }
 
 impl Default for Synthetic {
     fn default() -> Self {
-        Self { image: [256, 256], size: [32, 24], frames: 33, interval: 8, time: cubist_core::format::TIME_CUBIC, looping: false, independent_every: 3 }
+        Self {
+            image: [256, 256],
+            size: [32, 24],
+            frames: 33,
+            interval: 8,
+            time: TIME_CUBIC,
+            looping: false,
+            independent_every: 3,
+            storage: Storage::Raw,
+        }
     }
 }
 
@@ -70,6 +81,6 @@ impl Synthetic {
         let settings = CodingSettings { step_log2: 0, lambda: 0.0, independent_every: self.independent_every };
         let content =
             Content { grid: &grid, image: &image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields, planes: &[], cameras: &[] };
-        Ok(encode::bundle(&content, settings, Header { storage: Storage::Raw, fps: 30, info: "synthetic" })?)
+        Ok(encode::bundle(&content, settings, Header { storage: self.storage, fps: 30, info: "synthetic" })?)
     }
 }
