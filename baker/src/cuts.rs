@@ -3,6 +3,7 @@
 
 use crate::gbuffer::GBuffer;
 use crate::sheets::KeyGrid;
+use rayon::prelude::*;
 
 /// A place that moves farther than this from one frame to the next, texels, is another place.
 const FAR: f32 = 32.0;
@@ -18,7 +19,7 @@ const LEAST: usize = 20;
 #[must_use]
 pub fn keys(gbuffer: &GBuffer, grid: &KeyGrid) -> Option<Vec<u32>> {
     let last = grid.frames - 1;
-    let jumps: Vec<usize> = (0..last).map(|frame| jump(gbuffer, grid, frame)).collect();
+    let jumps: Vec<usize> = (0..last).into_par_iter().map(|frame| jump(gbuffer, grid.size, frame)).collect();
     let calm = |frame: Option<usize>| frame.and_then(|frame| jumps.get(frame)).is_none_or(|&jump| jump <= LEAST);
     let cuts = (0..jumps.len()).filter(|&at| jumps[at] >= MOST && calm(at.checked_sub(1)) && calm(Some(at + 1)));
     let mut keys: Vec<u32> =
@@ -32,25 +33,23 @@ pub fn keys(gbuffer: &GBuffer, grid: &KeyGrid) -> Option<Vec<u32>> {
     Some(keys)
 }
 
-/// The share of the pixels at nodes, background aside, that see another place in the frame after `frame`, percent.
-fn jump(gbuffer: &GBuffer, grid: &KeyGrid, frame: u32) -> usize {
-    let [width, height] = grid.size;
-    let spacing = 1usize << grid.grid.log2;
+/// The share of the pixels, background aside, that see another place in the frame after `frame`, percent. Of all pixels: a fence whose boards
+/// are as far apart as nodes passes all of those at once.
+fn jump(gbuffer: &GBuffer, [width, height]: [usize; 2], frame: u32) -> usize {
     let (mut jumps, mut count) = (0, 0);
-    for y in (0..height).step_by(spacing) {
-        for x in (0..width).step_by(spacing) {
-            let [from, to] = [frame, frame + 1].map(|frame| (frame as usize * height + y) * width + x);
-            // Behind everything nothing moves.
-            if gbuffer.label[from] == 0 && gbuffer.label[to] == 0 {
-                continue;
-            }
-            let [a, b] = [from, to].map(|pixel| gbuffer.uv[pixel]);
-            let far = (a[0] - b[0]).abs().max((a[1] - b[1]).abs()) > FAR;
-            jumps += usize::from(far || gbuffer.label[from] != gbuffer.label[to]);
-            count += 1;
+    let frames = [frame, frame + 1].map(|frame| frame as usize * width * height..(frame as usize + 1) * width * height);
+    for (from, to) in frames[0].clone().zip(frames[1].clone()) {
+        // Behind everything nothing moves.
+        if gbuffer.label[from] == 0 && gbuffer.label[to] == 0 {
+            continue;
         }
+        let [a, b] = [from, to].map(|pixel| gbuffer.uv[pixel]);
+        let far = (a[0] - b[0]).abs().max((a[1] - b[1]).abs()) > FAR;
+        jumps += usize::from(far || gbuffer.label[from] != gbuffer.label[to]);
+        count += 1;
     }
-    100 * jumps / count.max(1)
+    // Little is seen: it may come and go as it likes.
+    if 8 * count < width * height { 0 } else { 100 * jumps / count }
 }
 
 #[cfg(test)]

@@ -124,36 +124,36 @@ macro_rules! cases {
 }
 
 cases! {
-    shared_edges: 0.0, 100.0, 999.0, nothing_shows_through;
-    along_a_face: 0.0, 100.0, 999.0;
-    inside_a_solid: 0.0, 100.0, 999.0;
-    on_a_surface: 0.0, 100.0, 999.0;
-    coplanar_faces: 0.0, 100.0, 999.0, the_lowest_face_wins;
-    slivers: 0.0, 100.0, 999.0, nothing_shows_through;
-    town: 0.0, 100.0, 999.0;
-    far_from_the_origin: 0.0, 100.0, 999.0, as_good_as_at_home;
-    a_millionth: 0.0, 100.0, 999.0, as_good_as_at_home;
-    a_ring_on_a_mountain: 0.0, 100.0, 999.0;
-    the_apex_of_a_cone: 0.0, 100.0, 999.0;
-    a_rolling_silhouette: 0.0, 100.0, 999.0;
-    edge_on: 0.0, 100.0, 999.0;
-    the_horizon: 0.0, 100.0, 999.0;
-    a_ball_from_all_to_nothing: 0.0, 100.0, 999.0;
-    a_needle: 0.0, 100.0, 999.0;
-    a_fence_at_the_cells_frequency: 0.0, 100.0, 999.0;
-    t_junctions: 0.0, 100.0, 999.0;
-    four_sheets_in_a_cell: 0.0, 100.0, 999.0;
-    a_sheet_between_two_keys: 0.0, 100.0, 999.0, it_is_seen_between_keys_only;
-    a_moebius_strip: 0.0, 100.0, 999.0;
-    a_soup: 0.0, 100.0, 999.0;
-    a_cut: 0.0, 100.0, 999.0;
-    a_standing_camera: 0.0, 100.0, 999.0, nothing_flickers;
-    half_a_turn_between_two_keys: 0.0, 100.0, 999.0;
-    along_rows_of_texels: 0.0, 100.0, 999.0;
-    around_a_ring: 0.0, 100.0, 999.0;
-    around_a_ring_and_back: 0.0, 100.0, 999.0;
-    a_gateway: 0.0, 100.0, 999.0;
-    arch_in_planes: 0.0, 100.0, 999.0;
+    shared_edges: 52.0, 0.1, 0.5, nothing_shows_through;
+    along_a_face: 37.0, 0.2, 1.0;
+    inside_a_solid: 34.0, 0.4, 8.0;
+    on_a_surface: 32.0, 0.5, 151.0;
+    coplanar_faces: 31.5, 0.8, 0.5, the_lowest_face_wins;
+    slivers: 50.5, 0.1, 0.5, nothing_shows_through;
+    town: 30.5, 1.0, 5.0;
+    far_from_the_origin: 30.5, 1.0, 5.0, as_good_as_at_home;
+    a_millionth: 31.0, 0.9, 5.0, as_good_as_at_home;
+    a_ring_on_a_mountain: 27.0, 1.8, 184.0;
+    the_apex_of_a_cone: 28.5, 0.2, 7.0;
+    a_rolling_silhouette: 30.5, 1.0, 17.0;
+    edge_on: 23.0, 1.1, 17.0;
+    the_horizon: 33.5, 0.2, 238.0;
+    a_ball_from_all_to_nothing: 26.0, 0.6, 81.0;
+    a_needle: 32.0, 0.3, 1.0;
+    a_fence_at_the_cells_frequency: 55.5, 0.1, 0.5;
+    t_junctions: 31.5, 0.3, 1.0;
+    four_sheets_in_a_cell: 37.5, 0.2, 0.5;
+    a_sheet_between_two_keys: 54.0, 0.1, 0.5, it_is_seen_between_keys_only;
+    a_moebius_strip: 25.0, 1.9, 5.0;
+    a_soup: 26.0, 1.4, 14.0;
+    a_cut: 25.5, 1.1, 5.0;
+    a_standing_camera: 35.5, 0.3, 4.0, nothing_flickers;
+    half_a_turn_between_two_keys: 16.0, 3.0, 70.0;
+    along_rows_of_texels: 98.0, 0.1, 0.5;
+    around_a_ring: 21.5, 2.1, 43.0;
+    around_a_ring_and_back: 21.5, 2.2, 45.0;
+    a_gateway: 24.0, 1.2, 13.0;
+    arch_in_planes: 26.0, 1.3, 13.0;
 }
 
 /// No ray gets through a closed wall to what stands behind it.
