@@ -22,8 +22,7 @@ pub fn keys(gbuffer: &GBuffer, grid: &KeyGrid) -> Option<Vec<u32>> {
     let jumps: Vec<usize> = (0..last).into_par_iter().map(|frame| jump(gbuffer, grid.size, frame)).collect();
     let calm = |frame: Option<usize>| frame.and_then(|frame| jumps.get(frame)).is_none_or(|&jump| jump <= LEAST);
     let cuts = (0..jumps.len()).filter(|&at| jumps[at] >= MOST && calm(at.checked_sub(1)) && calm(Some(at + 1)));
-    let mut keys: Vec<u32> =
-        cuts.map(|at| at as u32).flat_map(|at| at.saturating_sub(1)..=(at + 2).min(last)).collect();
+    let mut keys: Vec<u32> = cuts.map(|at| at as u32).flat_map(|at| at.saturating_sub(1)..=(at + 2).min(last)).collect();
     if keys.is_empty() {
         return None;
     }
@@ -60,7 +59,8 @@ mod tests {
     /// Keys of 24 frames in which all of the screen is `shift(frame)` texels along a chart.
     fn of(shift: fn(u32) -> f32) -> Option<Vec<u32>> {
         let (width, height, frames) = (32, 24, 24);
-        let places = (0..frames).flat_map(|frame| (0..width * height).map(move |at| [(at % width) as f32 + shift(frame), (at / width) as f32]));
+        let places =
+            (0..frames).flat_map(|frame| (0..width * height).map(move |at| [(at % width) as f32 + shift(frame), (at / width) as f32]));
         let uv: Vec<[f32; 2]> = places.collect();
         let gbuffer = GBuffer { width, height, frames, label: vec![1; uv.len()], uv: uv.into() };
         keys(&gbuffer, &KeyGrid::new(&gbuffer, 3, 8, false, [TIME_CUBIC, SPACE_CUBIC]))

@@ -32,7 +32,9 @@ fn bake(dir: &Path, arguments: &[&str]) -> (Output, Duration) {
 
 fn png(width: u32, height: u32) -> Vec<u8> {
     let mut bytes = std::io::Cursor::new(Vec::new());
-    image::RgbImage::from_fn(width, height, |x, y| image::Rgb([x as u8, y as u8, 90])).write_to(&mut bytes, image::ImageFormat::Png).unwrap();
+    image::RgbImage::from_fn(width, height, |x, y| image::Rgb([x as u8, y as u8, 90]))
+        .write_to(&mut bytes, image::ImageFormat::Png)
+        .unwrap();
     bytes.into_inner()
 }
 
@@ -48,7 +50,9 @@ fn bomb(side: u32) -> Vec<u8> {
 
 /// The CRC-32 of PNG chunks.
 fn crc(bytes: &[u8]) -> u32 {
-    !bytes.iter().fold(!0u32, |crc, byte| (0..8).fold(crc ^ u32::from(*byte), |crc, _| crc >> 1 ^ if crc & 1 == 1 { 0xedb8_8320 } else { 0 }))
+    !bytes
+        .iter()
+        .fold(!0u32, |crc, byte| (0..8).fold(crc ^ u32::from(*byte), |crc, _| crc >> 1 ^ if crc & 1 == 1 { 0xedb8_8320 } else { 0 }))
 }
 
 /// A model with a texture: what faces it and which file its library names.
@@ -73,7 +77,9 @@ fn what_is_wrong_is_said_with_place_and_cure() {
     let cases: Vec<(Vec<File>, &[&str], Vec<&str>)> = vec![
         // A graph that bites its tail, directly and around.
         (
-            vec![gltf(&format!("{MESH},\"scenes\":[{{\"nodes\":[0]}}],\"scene\":0,\"nodes\":[{{\"mesh\":0,\"children\":[1]}},{{\"children\":[0]}}]"))],
+            vec![gltf(&format!(
+                "{MESH},\"scenes\":[{{\"nodes\":[0]}}],\"scene\":0,\"nodes\":[{{\"mesh\":0,\"children\":[1]}},{{\"children\":[0]}}]"
+            ))],
             &["a.gltf"],
             vec!["a.gltf", "node", "ancestor"],
         ),
@@ -87,7 +93,9 @@ fn what_is_wrong_is_said_with_place_and_cure() {
             vec!["a.gltf", "node"],
         ),
         (
-            vec![gltf(&format!("{MESH},\"extensionsRequired\":[\"EXT_from_the_future\"],\"scenes\":[{{\"nodes\":[0]}}],\"nodes\":[{{\"mesh\":0}}]"))],
+            vec![gltf(&format!(
+                "{MESH},\"extensionsRequired\":[\"EXT_from_the_future\"],\"scenes\":[{{\"nodes\":[0]}}],\"nodes\":[{{\"mesh\":0}}]"
+            ))],
             &["a.gltf"],
             vec!["a.gltf", "EXT_from_the_future"],
         ),
@@ -104,15 +112,31 @@ fn what_is_wrong_is_said_with_place_and_cure() {
         (vec![text("b.obj", "")], &["b.obj"], vec!["b.obj", "no triangles"]),
         (vec![File("t.png", bomb(60_000)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], &["b.obj"], vec!["t.png"]),
         (vec![File("t.png", bomb(2_000)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], &["b.obj"], vec!["t.png"]),
-        (vec![File("t.png", png(100_000, 1)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], &["b.obj"], vec!["material \"m\"", "t.png", "too large", "16384"]),
-        (vec![File("t.png", b"no picture".to_vec()), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], &["b.obj"], vec!["t.png", "not a picture"]),
+        (
+            vec![File("t.png", png(100_000, 1)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)],
+            &["b.obj"],
+            vec!["material \"m\"", "t.png", "too large", "16384"],
+        ),
+        (
+            vec![File("t.png", b"no picture".to_vec()), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)],
+            &["b.obj"],
+            vec!["t.png", "not a picture"],
+        ),
         (vec![], &["https://example.com/a.glb"], vec!["https://example.com/a.glb", "download it"]),
         (vec![], &["none.glb"], vec!["none.glb", "no such file", "check the path"]),
         (vec![], &["."], vec![".", "directory"]),
-        (vec![text("a.toml", "[scene]\nmodel = \"a.obj\"\n[camera]\nfov = 0\n")], long, vec!["a.toml", "line 4", "camera.fov", "between 0 and 180"]),
+        (
+            vec![text("a.toml", "[scene]\nmodel = \"a.obj\"\n[camera]\nfov = 0\n")],
+            long,
+            vec!["a.toml", "line 4", "camera.fov", "between 0 and 180"],
+        ),
         (vec![text("a.toml", "[scene]\nmodel = \"a.obj\"\n[camera]\nfov = 180.0\n")], long, vec!["line 4", "camera.fov", "found 180"]),
         (vec![text("a.toml", "[scene]\nmodel = \"a.obj\"\n[playback]\nframes = 0\n")], long, vec!["line 4", "playback.frames", "found 0"]),
-        (vec![text("a.toml", "[scene]\nmodel = \"a.obj\"\n[playback]\nsize = [0, 10]\n")], long, vec!["line 4", "playback.size", "found 0"]),
+        (
+            vec![text("a.toml", "[scene]\nmodel = \"a.obj\"\n[playback]\nsize = [0, 10]\n")],
+            long,
+            vec!["line 4", "playback.size", "found 0"],
+        ),
         (
             vec![text(
                 "a.toml",
@@ -136,7 +160,8 @@ fn what_is_wrong_is_said_with_place_and_cure() {
         assert!(expected.iter().all(|part| said.contains(part)), "expected {expected:?} in: {said}");
         assert!(said.starts_with("error: ") && !said.contains("panicked"), "{said}");
         assert!(took < Duration::from_secs(5), "{took:?} for: {said}");
-        let mut left: Vec<_> = std::fs::read_dir(dir.path()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        let mut left: Vec<_> =
+            std::fs::read_dir(dir.path()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
         (left.sort(), names.sort());
         assert_eq!(left, names, "nothing is left behind by: {said}");
     }
@@ -161,8 +186,16 @@ fn a_file_that_may_not_be_read_is_said() {
 fn what_is_odd_but_right_bakes() {
     let cases: Vec<(Vec<File>, &str, &[&str])> = vec![
         (vec![File("t.png", png(1, 1)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], "b.obj", &["--size", "32x24", "--frames", "3"]),
-        (vec![File("t.png", png(16_384, 1)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], "b.obj", &["--size", "32x24", "--frames", "3"]),
-        (vec![File("t.png", png(1, 16_384)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], "b.obj", &["--size", "32x24", "--frames", "3"]),
+        (
+            vec![File("t.png", png(16_384, 1)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)],
+            "b.obj",
+            &["--size", "32x24", "--frames", "3"],
+        ),
+        (
+            vec![File("t.png", png(1, 16_384)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)],
+            "b.obj",
+            &["--size", "32x24", "--frames", "3"],
+        ),
         (vec![], "a.obj", &["--size", "1x1", "--frames", "1"]),
         (vec![], "a.obj", &["--size", "2000x2000", "--frames", "1"]),
         (vec![], "a.obj", &["--size", "37x23", "--frames", "5"]),
@@ -175,7 +208,11 @@ fn what_is_odd_but_right_bakes() {
             "szene eins.toml",
             &[],
         ),
-        (vec![text("a.toml", "[scene]\nmodel = \"a.obj\"\n[camera]\nfov = 179.9\n[playback]\nsize = [32, 24]\nframes = 3\n")], "a.toml", &[]),
+        (
+            vec![text("a.toml", "[scene]\nmodel = \"a.obj\"\n[camera]\nfov = 179.9\n[playback]\nsize = [32, 24]\nframes = 3\n")],
+            "a.toml",
+            &[],
+        ),
         (vec![text("a.toml", "[scene]\nmodel = \"a.obj\"\n[camera]\nfov = 0.1\n[playback]\nsize = [32, 24]\nframes = 3\n")], "a.toml", &[]),
     ];
     for (files, scene, arguments) in cases {

@@ -60,7 +60,9 @@ fuzz_target!(|any: Any| {
     // seam or at the picture's edge, or is so steep that the nodes beyond the screen lie outside what can be stored.
     let slow = |axis: usize| f64::from(any.step[axis]) / 256.0 * f64::from(scene.image[axis]) <= 4.0 * f64::from(scene.size[axis]);
     let inside = |at: [f32; 2]| (0..2).all(|axis| at[axis] > 0.0 && at[axis] < scene.image[axis] as f32 - 0.02);
-    let corners = [0, scene.frames - 1].into_iter().flat_map(|f| [0, 1, 2, 3].map(|i: u32| place(f, (i & 1) * (scene.size[0] - 1), (i >> 1) * (scene.size[1] - 1))));
+    let corners = [0, scene.frames - 1]
+        .into_iter()
+        .flat_map(|f| [0, 1, 2, 3].map(|i: u32| place(f, (i & 1) * (scene.size[0] - 1), (i >> 1) * (scene.size[1] - 1))));
     if scene.time != TIME_HOLD && !scene.looping && slow(0) && slow(1) && corners.into_iter().all(inside) {
         play::visit(&raw, frames, |frame, player| {
             for (at, probe) in (0..).zip(play::probes(player)) {

@@ -78,12 +78,18 @@ impl Edit {
         };
         match random.below(20) {
             0 | 1 => Self::Flip { section: byte(random), at: random.below(1 << 20) as u32, bits: byte(random) },
-            2 => Self::Noise { section: byte(random), at: random.below(1 << 20) as u32, length: random.below(64) as u16, seed: byte(random) },
+            2 => {
+                Self::Noise { section: byte(random), at: random.below(1 << 20) as u32, length: random.below(64) as u16, seed: byte(random) }
+            }
             3 => Self::Cut { section: byte(random), length: random.below(1 << 14) as u32 },
             4 if random.below(8) == 0 => Self::Drop(byte(random)),
             4 => Self::First(byte(random)),
             5..=7 => Self::Limit(byte(random), number(random)),
-            8 => Self::Header(byte(random), number(random)),
+            8 => {
+                let (which, to) = (byte(random), number(random));
+                // Large screens take long and show little more than small ones.
+                Self::Header(which, if which % 9 < 2 && random.below(16) > 0 { to % 100 } else { to })
+            }
             9 => {
                 let bits = random.below(25);
                 Self::Frames(random.below(1 << bits) as u32)

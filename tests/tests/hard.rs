@@ -13,8 +13,8 @@ use cubist_core::Bundle;
 use cubist_core::format::SPACE_CUBIC;
 use cubist_tests::hard::exact::{self, Meeting};
 use cubist_tests::hard::{self, Baked, CASES, Figures, baseline, rays};
-use cubist_tests::reference::{Reference, Weights};
 use cubist_tests::play;
+use cubist_tests::reference::{Reference, Weights};
 
 /// Pixels that may differ from the f64 player's, percent.
 const DIFFERING: f64 = 0.25;
@@ -48,11 +48,16 @@ fn integers_are_exact(bytes: &[u8]) {
     let (mut pixels, mut differ) = (0, 0);
     play::visit(bytes, [0, 3, frames / 2, frames - 2], |frame, player| {
         let (colours, probes) = (play::pixels(player), play::probes(player));
-        for (index, (exact, (colour, probe))) in reference.frame(frame, Weights::Player).iter().zip(colours.into_iter().zip(probes)).enumerate() {
+        for (index, (exact, (colour, probe))) in
+            reference.frame(frame, Weights::Player).iter().zip(colours.into_iter().zip(probes)).enumerate()
+        {
             let exact = exact.unwrap_or_else(|| panic!("frame {frame}, pixel {index}: no sheet shows"));
             let at = [probe.at.u, probe.at.v].map(|x| f64::from(x) / 65_536.0);
             let apart = (at[0] - exact.at[0]).abs().max((at[1] - exact.at[1]).abs());
-            assert!(probe.label != exact.label || apart <= bound, "frame {frame}, pixel {index}: {apart:.2e} texels apart: {at:?}, {exact:?}");
+            assert!(
+                probe.label != exact.label || apart <= bound,
+                "frame {frame}, pixel {index}: {apart:.2e} texels apart: {at:?}, {exact:?}"
+            );
             let same = probe.label == exact.label && colour == exact.colour;
             assert!(same || exact.margin <= bound || exact.outline <= outline, "frame {frame}, pixel {index}: {at:?}, {exact:?}");
             (pixels, differ) = (pixels + 1, differ + usize::from(!same));
@@ -92,7 +97,8 @@ fn check(name: &str, psnr_min: f64, wrong_percent: f64, off_texels: f64) -> (Bak
     println!("{name}: {} bytes, {figures:?}", baked.encoded.bundle.len());
     rays_are_exact(&baked);
     integers_are_exact(&baked.encoded.bundle);
-    let good = figures.psnr_min >= psnr_min && figures.wrong_surface_percent <= wrong_percent && figures.position_error_texels <= off_texels;
+    let good =
+        figures.psnr_min >= psnr_min && figures.wrong_surface_percent <= wrong_percent && figures.position_error_texels <= off_texels;
     assert!(good, "{name} ({}): {figures:?}", case.why);
     let before = baseline::read().expect("there is a baseline");
     let worse = baseline::worse(&figures, before.get(name).expect("the baseline has every case"));
@@ -165,9 +171,10 @@ fn nothing_shows_through(baked: &Baked, _: &Figures) {
         // Beside the wall it is to be seen: where a ray passes the wall's rectangle by.
         let direction = lens.direction(f64::from(x) + 0.5, f64::from(y) + 0.5);
         let at = lens.eye + direction * (-lens.eye.z / direction.z);
-        let inside = baked.scene.triangles[..last].iter().flat_map(|t| t.position).fold([[f64::MAX, f64::MIN]; 2], |[a, b], p| {
-            [[a[0].min(p.x), a[1].max(p.x)], [b[0].min(p.y), b[1].max(p.y)]]
-        });
+        let inside = baked.scene.triangles[..last]
+            .iter()
+            .flat_map(|t| t.position)
+            .fold([[f64::MAX, f64::MIN]; 2], |[a, b], p| [[a[0].min(p.x), a[1].max(p.x)], [b[0].min(p.y), b[1].max(p.y)]]);
         if (inside[0][0]..=inside[0][1]).contains(&at.x) && (inside[1][0]..=inside[1][1]).contains(&at.y) {
             all += 1;
             if hit.is_none_or(behind) {
@@ -216,5 +223,9 @@ fn it_is_seen_between_keys_only(baked: &Baked, _: &Figures) {
         pixel += 1;
     });
     assert!(seen.iter().any(|&pixels| pixels > 8), "it is not seen: {seen:?}");
-    assert!(baked.encoded.grid.keys.iter().all(|&key| seen[key as usize] == 0), "it is seen at a key: {:?}, {seen:?}", baked.encoded.grid.keys);
+    assert!(
+        baked.encoded.grid.keys.iter().all(|&key| seen[key as usize] == 0),
+        "it is seen at a key: {:?}, {seen:?}",
+        baked.encoded.grid.keys
+    );
 }

@@ -34,7 +34,7 @@ fn seeds() -> Vec<Vec<u8>> {
 
 #[test]
 fn a_hundred_thousand_hostile_bundles_are_refused_or_play() {
-    let dose = Dose { rows: 3, pixels: 64, walk: 3 };
+    let dose = Dose { rows: 2, pixels: 32, walk: 2 };
     let seeds = seeds();
     assert!(seeds.iter().all(|seed| survives(seed, dose)), "the seeds play");
     let played: usize = (0..BUNDLES)

@@ -87,7 +87,7 @@ fn ten_thousand_frames_play() {
     for looping in [false, true] {
         let mut scene = part("pyramid", [12, 8], 10_000, looping);
         scene.name = format!("{} looping {looping}", scene.name);
-        let bytes = check(&scene, &Settings::default(), 0.0, 100.0);
+        let bytes = check(&scene, &Settings::default(), 17.7, 6.2);
         let bundle = Bundle::parse(&bytes).expect("it parses");
         let mut memory = vec![0; bundle.memory_needed()];
         let mut player = Player::new(&bundle, &mut memory).expect("the memory it asked for");

@@ -6,8 +6,8 @@ use clap::{Parser, Subcommand};
 use cubist_baker::bake::Settings;
 use cubist_baker::scene::{Overrides, builtin, load, load_builtin};
 use cubist_tests::codecs::ffmpeg::Ffmpeg;
-use cubist_tests::tables::document::Document;
 use cubist_tests::hard::baseline;
+use cubist_tests::tables::document::Document;
 use cubist_tests::tables::{self, Table, atlas, codecs, coverage, edges, hard};
 use std::path::PathBuf;
 

@@ -51,7 +51,13 @@ pub fn meet(corners: [DVec3; 3], eye: DVec3, direction: DVec3) -> Meeting {
     }
     let distance = normal.dot(a) / normal.dot(direction);
     let within = (APART * distance.abs() + 16.0 * rounding) / sine.abs();
-    if distance.abs() <= within { Meeting::Unsure } else if distance < 0.0 { Meeting::Not } else { Meeting::At(distance, within) }
+    if distance.abs() <= within {
+        Meeting::Unsure
+    } else if distance < 0.0 {
+        Meeting::Not
+    } else {
+        Meeting::At(distance, within)
+    }
 }
 
 /// Says what is wrong with the tracer's answer for the ray through the middle of the pixel (`x`, `y`) of a frame; `None`: nothing.
@@ -59,7 +65,8 @@ pub fn meet(corners: [DVec3; 3], eye: DVec3, direction: DVec3) -> Meeting {
 pub fn disagreement(scene: &Scene, tracer: &Tracer<'_>, lens: &Lens, [x, y]: [u32; 2]) -> Option<String> {
     let (eye, direction) = (lens.eye, lens.direction(f64::from(x) + 0.5, f64::from(y) + 0.5));
     let meetings = || scene.triangles.iter().map(|triangle| meet(triangle.position, eye, direction));
-    let nearest = meetings().filter_map(|meeting| if let Meeting::At(distance, within) = meeting { Some((distance, within)) } else { None });
+    let nearest =
+        meetings().filter_map(|meeting| if let Meeting::At(distance, within) = meeting { Some((distance, within)) } else { None });
     let nearest = nearest.min_by(|a, b| a.0.total_cmp(&b.0));
     let wrong = |what: String| Some(format!("pixel ({x}, {y}): {what}; every triangle tried: {nearest:?}"));
     match (tracer.hit(eye, direction), nearest) {

@@ -41,7 +41,8 @@ pub fn edge_on() -> Scene {
     build.board(2, DVec3::new(0.9, 0.0, 3.2), [14.0, 10.0]);
     build.finish("edge-on", |s| {
         let turn = (s - 0.5).abs() - 0.1;
-        let eye = if turn <= 0.0 { DVec3::new(4.0, 0.0, 0.0) } else { orbit(DVec3::ZERO, 90.0 - 80.0 * turn * (0.5 - s).signum(), 4.0, 0.0).eye };
+        let eye =
+            if turn <= 0.0 { DVec3::new(4.0, 0.0, 0.0) } else { orbit(DVec3::ZERO, 90.0 - 80.0 * turn * (0.5 - s).signum(), 4.0, 0.0).eye };
         look(eye, DVec3::ZERO)
     })
 }

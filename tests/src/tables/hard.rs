@@ -35,12 +35,14 @@ pub fn measure_all() -> Result<Baseline> {
 /// What is worse than in the baseline, a line for each.
 #[must_use]
 pub fn regressions(now: &Baseline, before: &Baseline) -> Vec<String> {
-    let lines = now.iter().flat_map(|(name, now)| match before.get(name) {
-        Some(before) => baseline::worse(now, before),
-        None => vec![format!("not in {}; make it with: {}", baseline::file().display(), baseline::COMMAND)],
-    }
-    .into_iter()
-    .map(move |line| format!("{name}: {line}")));
+    let lines = now.iter().flat_map(|(name, now)| {
+        match before.get(name) {
+            Some(before) => baseline::worse(now, before),
+            None => vec![format!("not in {}; make it with: {}", baseline::file().display(), baseline::COMMAND)],
+        }
+        .into_iter()
+        .map(move |line| format!("{name}: {line}"))
+    });
     lines.collect()
 }
 
@@ -57,8 +59,7 @@ pub fn table(figures: &Baseline) -> Result<Table> {
         rows.push(row);
     }
     let cell = |row: &Value, key: &str, digits: usize| row[key].as_str().map_or_else(|| number(&row[key], digits), str::to_owned);
-    let lines: Vec<Vec<String>> =
-        rows.iter().map(|row| COLUMNS.iter().map(|&(key, _, digits)| cell(row, key, digits)).collect()).collect();
+    let lines: Vec<Vec<String>> = rows.iter().map(|row| COLUMNS.iter().map(|&(key, _, digits)| cell(row, key, digits)).collect()).collect();
     Ok(Table { markdown: markdown(&COLUMNS.map(|column| column.1), 2, &lines), json: Value::from(rows) })
 }
 
@@ -74,7 +75,10 @@ mod tests {
         assert!(regressions(&before, &before).is_empty());
         let now = Baseline::from([("town".to_owned(), Figures { psnr_min: 24.0, ..good }), ("new".to_owned(), good)]);
         let lines = regressions(&now, &before);
-        assert!(lines.len() == 2 && lines[0].starts_with("new: not in ") && lines[1].starts_with("town: PSNR of the worst frame"), "{lines:?}");
+        assert!(
+            lines.len() == 2 && lines[0].starts_with("new: not in ") && lines[1].starts_with("town: PSNR of the worst frame"),
+            "{lines:?}"
+        );
         let table = table(&before).unwrap();
         assert!(table.markdown.contains("| town | nothing is hard"), "{}", table.markdown);
         assert_eq!(table.json[0]["psnr_mean"], 30.0);
