@@ -27,7 +27,7 @@ fuzz_target!(|bytes: &[u8]| {
             }
             let _ = (0..=u8::MAX).map(|label| bundle.label(label).right).max();
             let _ = (bundle.moment(bundle.frames() - 1), bundle.memory_needed(), bundle.sections().count());
-            assert!(survives(&bytes, Dose { rows: 2, pixels: 64, walk: 2 }));
+            assert!(survives(&bytes, Dose { rows: 2, pixels: 64, walk: 2, middle: true }));
         }
     }
 });

@@ -23,7 +23,7 @@ static SEEDS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
     let seed = |(name, texels, storage)| {
         let mut settings = Settings { cell: 8, key_interval: 2, ..Settings::default() };
         (settings.atlas.max_side, settings.atlas.texels, settings.atlas.storage) = (64, texels, storage);
-        let mut scene = scenes::reduced(name, [28, 20], 6).expect("there is such a scene");
+        let mut scene = scenes::reduced(name, [20, 12], 5).expect("there is such a scene");
         scene.playback.looping = name == "columns";
         scenes::bake(&scene, &settings).expect("it bakes").1.bundle
     };
@@ -41,7 +41,7 @@ struct Recipe {
 impl<'a> Arbitrary<'a> for Recipe {
     fn arbitrary(bytes: &mut Unstructured<'a>) -> arbitrary::Result<Self> {
         let seed = bytes.arbitrary()?;
-        let dose = Dose { rows: 1 + bytes.int_in_range(0..=5)?, pixels: 64, walk: bytes.int_in_range(0..=4)? };
+        let dose = Dose { rows: 1 + bytes.int_in_range(0..=5)?, pixels: 64, walk: bytes.int_in_range(0..=4)?, middle: true };
         let mut edits = Vec::new();
         while !bytes.is_empty() && edits.len() < 12 {
             edits.push(edit(bytes)?);

@@ -74,5 +74,5 @@ fuzz_target!(|any: Any| {
         })
         .expect("it plays");
     }
-    assert!(survives(&raw, Dose { rows: 3, pixels: 64, walk: 3 }));
+    assert!(survives(&raw, Dose { rows: 3, pixels: 64, walk: 3, middle: true }));
 });

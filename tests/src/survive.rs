@@ -14,6 +14,8 @@ pub struct Dose {
     pub pixels: usize,
     /// Frames before each that are passed through one by one when it is played the second time.
     pub walk: u32,
+    /// Not the first and the last frame alone.
+    pub middle: bool,
 }
 
 /// Whether `bytes` parse; if so a dose of them is played twice, and all promises are checked.
@@ -37,7 +39,8 @@ fn play(bundle: &Bundle<'_>, fill: u8, dose: Dose) -> Vec<u16> {
     let mut pixels = Vec::new();
     let width = (width as usize).min(dose.pixels);
     let (mut row, mut again) = (vec![0; width], vec![0; width]);
-    for frame in [0, bundle.frames() / 2, bundle.frames() - 1] {
+    let frames = [0, bundle.frames() / 2, bundle.frames() - 1];
+    for frame in frames.into_iter().step_by(if dose.middle { 1 } else { 2 }) {
         for frame in frame.saturating_sub(dose.walk)..=frame {
             player.seek(Frame(frame));
             bounded(bundle, player.work(), 0);

@@ -144,7 +144,7 @@ cases! {
     a_rolling_silhouette: 30.5, 1.0, 17.0;
     edge_on: 23.0, 1.1, 17.0;
     the_horizon: 33.5, 0.2, 238.0;
-    a_ball_from_all_to_nothing: 26.0, 0.6, 81.0;
+    a_ball_from_all_to_nothing: 26.0, 0.6, 112.0;
     a_needle: 32.0, 0.3, 1.0;
     a_fence_at_the_cells_frequency: 55.5, 0.1, 0.5;
     t_junctions: 31.5, 0.3, 1.0;
