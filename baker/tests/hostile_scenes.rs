@@ -162,7 +162,8 @@ fn what_is_wrong_is_said_with_place_and_cure() {
         assert!(took < Duration::from_secs(5), "{took:?} for: {said}");
         let mut left: Vec<_> =
             std::fs::read_dir(dir.path()).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
-        (left.sort(), names.sort());
+        left.sort();
+        names.sort();
         assert_eq!(left, names, "nothing is left behind by: {said}");
     }
 }
@@ -173,7 +174,7 @@ fn a_file_that_may_not_be_read_is_said() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.obj");
     std::fs::write(&path, TRIANGLE).unwrap();
-    std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0)).unwrap();
+    std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o000)).unwrap();
     // Who may do anything may read it: then it bakes.
     let readable = std::fs::read(&path).is_ok();
     let (output, _) = bake(dir.path(), &["a.obj", "--size", "16x12", "--frames", "2"]);
