@@ -2,8 +2,8 @@
 //! Rays are those of a scene's camera; what disagrees goes to the tests as words.
 //!
 //! Another way than the tracer's, in double precision: on which sides of a triangle's edges a ray passes, by the volumes that it spans with
-//! each, and where it meets the triangle's plane. Where a volume is less than [`NEAR`] of all three, or the ray runs along the plane, either
-//! answer is right; everywhere else the distance has to agree to [`APART`] of itself over the sine of the angle between ray and plane.
+//! each, and where it meets the triangle's plane. Where a volume is less than `NEAR` of all three, or the ray runs along the plane, either
+//! answer is right; everywhere else the distance has to agree to `APART` of itself over the sine of the angle between ray and plane.
 
 use cubist_baker::gbuffer::Lens;
 use cubist_baker::scene::Scene;
