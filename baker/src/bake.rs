@@ -13,7 +13,7 @@ use crate::sheets::{self, KeyGrid, Layers};
 use crate::trace::Tracer;
 use crate::verify::VerifyError;
 use crate::walls;
-use crate::{fields, fit, order, polish, spare, tears, timing};
+use crate::{cuts, fields, fit, order, polish, spare, tears, timing};
 use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC};
 use std::time::Instant;
 use thiserror::Error;
@@ -240,6 +240,8 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let grid = KeyGrid::new(gbuffer, cell_log2, settings.key_interval, scene.playback.looping, [settings.time, settings.space]);
     let adapted = if settings.adapt_keys { timing::place(gbuffer, &grid) } else { None };
     let grid = adapted.map_or(grid.clone(), |keys| grid.with_keys(keys));
+    let cut = if settings.adapt_keys { cuts::keys(gbuffer, &grid) } else { None };
+    let grid = cut.map_or(grid.clone(), |keys| grid.with_keys(keys));
     // In small cells and short intervals a few pixels are much.
     let volume = settings.cell * settings.cell * settings.key_interval;
     let least = if volume < 512 { settings.least_pixels.min(volume / 64).max(1) } else { settings.least_pixels };

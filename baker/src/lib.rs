@@ -9,6 +9,7 @@ pub mod camera;
 pub mod causes;
 pub mod chart;
 pub mod choose;
+mod cuts;
 pub mod encode;
 pub mod fields;
 pub mod files;

@@ -5,11 +5,15 @@
 pub mod codecs;
 pub mod figures;
 pub mod golden;
+pub mod hard;
+pub mod mutate;
 pub mod partitions;
 pub mod play;
 pub mod random;
 pub mod reference;
 pub mod scenes;
+pub mod survive;
+pub mod synthetic;
 pub mod tables;
 pub mod tamper;
 

@@ -1,13 +1,14 @@
 //! Prints the project's tables, as Markdown or as one JSON document, or puts them into a document.
 //! Tables come from `cubist_tests::tables`; they go to stdout or the file, progress to stderr.
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use clap::{Parser, Subcommand};
 use cubist_baker::bake::Settings;
 use cubist_baker::scene::{Overrides, builtin, load, load_builtin};
 use cubist_tests::codecs::ffmpeg::Ffmpeg;
+use cubist_tests::hard::baseline;
 use cubist_tests::tables::document::Document;
-use cubist_tests::tables::{self, Table, atlas, codecs, coverage, edges};
+use cubist_tests::tables::{self, Table, atlas, codecs, coverage, edges, hard};
 use std::path::PathBuf;
 
 /// Prints the tables of the README and the docs.
@@ -56,6 +57,15 @@ enum Name {
     Atlas {
         /// Built-in scenes or scene files; left out: five built-in ones.
         scenes: Vec<String>,
+    },
+    /// Numerically hard scenes, each small, at a size of their own.
+    Hard {
+        /// Fails where a figure is worse than in fixtures/hard.json by more than 0.1 dB.
+        #[arg(long)]
+        check: bool,
+        /// Writes fixtures/hard.json anew.
+        #[arg(long, conflicts_with = "check")]
+        update: bool,
     },
     /// What antialiased outlines are worth against the antialiased scene, and what they cost.
     Edges {
@@ -116,6 +126,17 @@ fn table(name: &Name, overrides: &Overrides) -> Result<Table> {
             }
             atlas::table(rows)
         }
+        Name::Hard { check, update } => {
+            let figures = hard::measure_all()?;
+            if *update {
+                baseline::write(&figures)?;
+            }
+            if *check {
+                let worse = hard::regressions(&figures, &baseline::read()?);
+                ensure!(worse.is_empty(), "{}", worse.join("\n"));
+            }
+            hard::table(&figures)?
+        }
         Name::Edges { scenes } => {
             for name in or_default(scenes, &edges::SCENES) {
                 rows.push(edges::measure(&tables::scene(&name, overrides)?)?);
@@ -135,6 +156,7 @@ impl Name {
             Self::Codecs { .. } => "codecs",
             Self::Atlas { .. } => "atlas",
             Self::Edges { .. } => "edges",
+            Self::Hard { .. } => "hard",
         }
     }
 }

@@ -7,6 +7,7 @@ pub mod codecs;
 pub mod coverage;
 pub mod document;
 pub mod edges;
+pub mod hard;
 
 use anyhow::Result;
 use cubist_baker::scene::{Overrides, Scene, load, load_builtin};
