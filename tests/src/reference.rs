@@ -370,6 +370,25 @@ fn middle([before, from, to, after]: [Option<[f64; 2]>; 4]) -> Option<[f64; 2]> 
     }))
 }
 
+/// The side of the player's tiles, pixels, in cells of `cell` pixels and with this kind of space.
+#[must_use]
+pub fn tile(cell: u32, space: u8) -> u32 {
+    if space == SPACE_CUBIC { cell / 2 } else { cell }.min(8)
+}
+
+/// How far the player's positions may be off in runs of tiles, texels, in a picture 2^`width_log2` texels wide: a position, its steps along
+/// both axes and how these change are each rounded to a step, and add up over a tile.
+#[must_use]
+pub fn packed(cell: u32, space: u8, width_log2: u32) -> f64 {
+    let steps = match width_log2 {
+        9 => 512.0,
+        8 | 10 => 256.0,
+        // No runs there.
+        _ => f64::INFINITY,
+    };
+    0.5 * f64::from(tile(cell, space)).powi(2) / steps
+}
+
 /// The value `x` and `y` of the way through a cell, which is bilinear in each quarter.
 fn quartered(points: &[[f64; 2]; 9], [x, y]: [f64; 2]) -> [f64; 2] {
     let (right, lower) = (usize::from(x >= 0.5), usize::from(y >= 0.5));

@@ -64,29 +64,16 @@ impl Found {
     }
 }
 
-/// A tile's side, pixels.
-fn side(cell: u32, space: u8) -> u32 {
-    if space == SPACE_CUBIC { cell / 2 } else { cell }.min(8)
-}
-
 /// The side of a bundle's tiles, pixels.
 fn tile(bytes: &[u8]) -> u32 {
     let bundle = Bundle::parse(bytes).expect("the baker's bytes parse");
-    side(1 << bundle.path().cell_log2, bundle.path().space)
+    reference::tile(1 << bundle.path().cell_log2, bundle.path().space)
 }
 
 /// The bounds of one pixel: on positions, texels, and on fields, pixels.
 fn bounds(pixel: &Pixel, cell: u32, space: u8, width_log2: u32, weights: Weights) -> [f64; 2] {
     let unit = 1.0 / f64::from(1u32 << 17);
-    let steps = match width_log2 {
-        9 => 512.0,
-        8 | 10 => 256.0,
-        // No runs there.
-        _ => f64::INFINITY,
-    };
-    // A position, its steps along both axes and how these change are each rounded to a step, and add up over a tile.
-    let tile = f64::from(side(cell, space));
-    let packed = 0.5 * tile * tile / steps;
+    let packed = reference::packed(cell, space, width_log2);
     let off = if weights == Weights::Exact { WEIGHT } else { 0.0 };
     let (rounded, spread) = if space == SPACE_CUBIC { (cell / 2 + 7, 25.0 / 16.0) } else { (cell + 2, 1.0) };
     // The slack is what f64 itself rounds.

@@ -14,7 +14,7 @@ use cubist_core::format::SPACE_CUBIC;
 use cubist_tests::hard::exact::{self, Meeting};
 use cubist_tests::hard::{self, Baked, CASES, Figures, baseline, rays};
 use cubist_tests::play;
-use cubist_tests::reference::{Reference, Weights};
+use cubist_tests::reference::{self, Reference, Weights};
 
 /// Pixels that may differ from the f64 player's, percent.
 const DIFFERING: f64 = 0.25;
@@ -43,7 +43,7 @@ fn integers_are_exact(bytes: &[u8]) {
     let cell = f64::from(1u32 << bundle.path().cell_log2);
     let steps = if bundle.path().space == SPACE_CUBIC { cell / 2.0 + 7.0 } else { cell + 2.0 };
     let unit = 1.0 / f64::from(1u32 << 17);
-    let packed = if bundle.atlas().width_log2 >= 8 { 2.0 / 256.0 } else { 0.0 };
+    let packed = reference::packed(1 << bundle.path().cell_log2, bundle.path().space, u32::from(bundle.atlas().width_log2));
     let (bound, outline) = (packed + steps * unit + 1e-9, 1.0 / 256.0 + (cell + 2.0) * unit + 1e-9);
     let (mut pixels, mut differ) = (0, 0);
     play::visit(bytes, [0, 3, frames / 2, frames - 2], |frame, player| {
