@@ -256,6 +256,23 @@ pub struct Playback {
     /// Frame 0 follows the last frame.
     #[arg(long)]
     pub looping: bool,
+    /// Turns the picture clockwise: 90, 180 or 270 degrees [default: 0].
+    ///
+    /// For a display that is mounted on its side: its own rows are then the bundle's, and nothing tears along a diagonal. The size is that before
+    /// turning: 320x240 turned by 90 makes a bundle of 240x320.
+    #[arg(long, value_name = "DEGREES", value_parser = quarters)]
+    pub turn: Option<u8>,
+}
+
+/// Quarters of a full turn.
+fn quarters(text: &str) -> Result<u8, String> {
+    match text {
+        "0" => Ok(0),
+        "90" => Ok(1),
+        "180" => Ok(2),
+        "270" => Ok(3),
+        _ => Err("expected 0, 90, 180 or 270 degrees".to_owned()),
+    }
 }
 
 /// What `cubist-bake inspect` takes.

@@ -129,10 +129,11 @@ fn throughput(args: &Throughput) -> Result<()> {
 fn load(name: &str, playback: &Playback) -> Result<Scene> {
     let overrides =
         scene::Overrides { size: playback.size, frames: playback.frames, fps: playback.fps, looping: playback.looping.then_some(true) };
-    Ok(match name.strip_prefix("builtin:") {
+    let scene = match name.strip_prefix("builtin:") {
         Some(builtin) => scene::load_builtin(builtin, &overrides)?,
         None => scene::load(Path::new(name), &overrides)?,
-    })
+    };
+    Ok(scene::turned(scene, playback.turn.unwrap_or(0)))
 }
 
 fn threads(count: Option<u16>) -> Result<()> {

@@ -12,9 +12,11 @@ mod model;
 mod obj;
 mod picture;
 mod ply;
+mod turned;
 
 pub use error::SceneError;
 pub use load::{Overrides, load, load_builtin};
+pub use turned::turned;
 
 use crate::camera::Path;
 use glam::{DVec3, Vec2, Vec3};
