@@ -58,7 +58,10 @@ pub fn any_run<T, const WIDTH: u32, const ROWS: u32>(
     offsets: [u32; 2],
     make: impl Fn(Packed<WIDTH, ROWS>) -> T,
 ) {
-    for (tile, pixels) in tiles.iter_mut().zip(out.chunks_exact_mut(1 << log2.min(TILE_LOG2))) {
+    let mut out = out;
+    for tile in tiles {
+        let Some((pixels, rest)) = out.split_at_mut_checked(1 << log2.min(TILE_LOG2)) else { return };
+        out = rest;
         alternate(pixels, tile.advance(), offsets, &make);
     }
 }

@@ -61,13 +61,21 @@ enum Trouble {
 /// Plays `bytes` in every way there is.
 fn play(bytes: &[u8], memory: &mut [u8], row: &mut [u16], probes: &mut [Probe]) -> Result<u32, Trouble> {
     let bundle = Bundle::parse(bytes).map_err(Trouble::Bundle)?;
+    #[cfg(not(feature = "rows"))]
     let mut player = Player::new(&bundle, memory).map_err(Trouble::Memory)?;
+    #[cfg(feature = "rows")]
+    let mut player = Player::<cubist_core::AnyTexels>::with_texels(&bundle, memory).map_err(Trouble::Memory)?;
     player.set_byte_order(black_box(ByteOrder::BigEndian));
     let mut sum = Sum(0);
     for frame in 0..black_box(3) {
         player.seek(Frame(frame));
         for y in 0..bundle.size().1 {
             player.row(y, row);
+            #[cfg(feature = "rows")]
+            for way in [Player::smooth_row, Player::dithered_row, Player::bilinear_row, Player::fine_row] {
+                way(&mut player, y, row);
+                black_box(&*row);
+            }
             player.probe_row(y, probes);
             black_box((&*row, &*probes));
         }
