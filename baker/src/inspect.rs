@@ -128,6 +128,12 @@ pub struct LimitsInfo {
     pub key_layers: u16,
     /// Layers in a row of nodes.
     pub row_layers: u16,
+    /// Chains in a key, each of layers of one label at neighbouring nodes of a row.
+    pub key_chains: u16,
+    /// Chains in a row of nodes.
+    pub row_chains: u16,
+    /// Layers of a key in chains that some cell tests.
+    pub key_fields: u16,
     /// Bytes of an interval's sheet lists.
     pub list_bytes: u16,
     /// Sheets in a row of cells.
@@ -260,6 +266,9 @@ impl Inspection {
             limits: LimitsInfo {
                 key_layers: limits.key_layers,
                 row_layers: limits.row_layers,
+                key_chains: limits.key_chains,
+                row_chains: limits.row_chains,
+                key_fields: limits.key_fields,
                 list_bytes: limits.list_bytes,
                 row_sheets: limits.row_sheets,
                 cell_sheets: limits.cell_sheets,
@@ -365,8 +374,18 @@ impl Inspection {
         let l = &self.limits;
         line(format!("Memory  {} bytes of working memory and a row of {} bytes", self.workspace, width * 2));
         line(format!(
-            "Limits  a key: {} layers, {} bytes of sheet lists; a row: {} layers, {} sheets; a cell: {} sheets; a layer: {} fields; a seek: {} keys",
-            l.key_layers, l.list_bytes, l.row_layers, l.row_sheets, l.cell_sheets, l.fields, l.seek_keys
+            "Limits  a key: {} layers in {} chains, {} of them with {} fields, {} bytes of sheet lists; a row: {} layers in {} chains, {} sheets; a \
+             cell: {} sheets; a seek: {} keys",
+            l.key_layers,
+            l.key_chains,
+            l.key_fields,
+            l.fields,
+            l.list_bytes,
+            l.row_layers,
+            l.row_chains,
+            l.row_sheets,
+            l.cell_sheets,
+            l.seek_keys
         ));
         out
     }

@@ -1,77 +1,147 @@
-//! How the fields of a layer are coded: each is told from the key before and the nodes west and north of it.
-//! Layers come from `nodes`, which says whether a cell tests them; codes go into the key.
+//! How the fields of a chain are coded: each is told from the key before and the nodes west and north of it.
+//! Chains come from `nodes`, traces say which layers a cell tests; codes go into the key.
 
 use crate::coder::{self, Bits, NUMBER_CONTEXTS, Probability};
-use crate::fixed::{MAX_FIELD, field_code};
+use crate::fixed::{MAX_FIELD, field_code, field_distance};
 use crate::format::{LabelRecord, STRIP};
-use crate::key::{Key, Setting, Source, Spot};
+use crate::key::{self, Chain, Key, Line, Setting, Source};
+use crate::predict::Trace;
 
 /// Ways a field can be told: from time and neighbours, from time, from neighbours, from nothing.
 const CLASSES: usize = 4;
 /// Contexts fields are coded with.
 pub const CONTEXTS: usize = CLASSES * NUMBER_CONTEXTS;
 
-/// Codes the fields of the layer at `spot` in `contexts` ([`CONTEXTS`] of them), or clears them where no cell `tested` them.
+/// Codes the fields of the layers of `chain`, in row `row` of `key`, in `contexts` ([`CONTEXTS`] of them), and clears those that no cell
+/// tests, as their `traces` say: the first field of all layers, then, where the label has two, the second.
+#[expect(clippy::too_many_arguments, reason = "the key's state, its memory and the chain's place are three different owners")]
+#[inline(never)]
 pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
     bits: &mut B,
     contexts: &mut [Probability],
     setting: &Setting<'_, '_, L>,
     key: &mut Key<'_>,
-    spot: &Spot,
-    tested: bool,
+    traces: &[Trace],
+    row: usize,
+    chain: Chain,
     source: &mut S,
 ) {
-    let strip = (setting.label)(spot.label).flags & STRIP != 0;
-    for which in 0..2usize {
-        let wanted = tested && (which == 0 || strip);
-        let code = if wanted { one(bits, contexts, setting, key, spot, which, source) } else { 0 };
-        if let Some(slot) = key.fields.get_mut(which).and_then(|codes| codes.get_mut(spot.layer)) {
-            *slot = code;
+    let label = chain.label as u8;
+    let strip = (setting.label)(label).flags & STRIP != 0;
+    let Key { row: rows, chain: chains, fields, .. } = key;
+    let line = |row: usize| key::of_row(rows, chains, row);
+    let start = line(row).first().map_or(0, |first| first.at);
+    let place = usize::from(chain.at.wrapping_sub(start)).wrapping_add(if row & 1 == 0 { 0 } else { traces.len() / 2 });
+    let traces = traces.get(place..).unwrap_or(&[]);
+    let columns = chain.first..chain.end;
+    for (which, codes) in fields.iter_mut().enumerate() {
+        let above = row.checked_sub(1);
+        let past = |row: Option<usize>| {
+            let key = setting.before?;
+            Some((Line::new(key.chains(row?), label), &**key.fields.get(which)?))
+        };
+        let north = Line::new(above.map_or(&[], line), label);
+        let mut known = Known { held: past(Some(row)), held_above: past(above), north, last: None };
+        for ((column, trace), index) in columns.clone().zip(traces).zip(usize::from(chain.field)..) {
+            let code = if trace.tested() && (which == 0 || strip) {
+                let told = known.told(codes, column);
+                let (predicted, class) = told.prediction();
+                let predicted = i32::from(field_code(predicted));
+                let node = row.wrapping_mul(setting.grid.node_columns()).wrapping_add(column.into());
+                let wanted = i32::from(source.field(node, label, which));
+                let Some(contexts) = contexts.get_mut(class.wrapping_mul(NUMBER_CONTEXTS)..) else { return };
+                let code = predicted.wrapping_add(coder::number(bits, contexts, wanted.wrapping_sub(predicted)));
+                let code = code.clamp(-MAX_FIELD, MAX_FIELD) as i8;
+                known.last = Some(Last { column, now: known_distance(code), held: told.held, north: told.north });
+                code
+            } else {
+                0
+            };
+            if let Some(slot) = codes.get_mut(index) {
+                *slot = code;
+            }
         }
     }
 }
 
-/// Codes one field of a layer, told from the key before and how the same field changed at the nodes west and north of it.
-fn one<B: Bits, S: Source, L>(
-    bits: &mut B,
-    contexts: &mut [Probability],
-    setting: &Setting<'_, '_, L>,
-    key: &Key<'_>,
-    spot: &Spot,
-    which: usize,
-    source: &mut S,
-) -> i8 {
-    let width = setting.grid.node_columns();
-    // A field of zero is one that nothing is known about: its layer was not tested.
-    let known = |key: &Key<'_>, node: Option<usize>| {
-        let distance = key.field(key.find(node?, spot.label)?).get(which).copied()?;
-        (distance != 0).then_some(distance)
-    };
-    let west = (spot.column > 0).then(|| spot.node.wrapping_sub(1));
-    let north = (spot.row > 0).then(|| spot.node.wrapping_sub(width));
-    let north_west = west.and(north).map(|node| node.wrapping_sub(1));
-    let before = |node: Option<usize>| setting.before.and_then(|key| known(key, node));
-    let held = before(Some(spot.node));
-    let change = |node: Option<usize>| known(key, node).zip(before(node)).map(|(now, then)| now.wrapping_sub(then));
-    let average = |a: Option<i32>, b: Option<i32>| match (a, b) {
-        (Some(a), Some(b)) => Some(a.wrapping_add(b) >> 1),
-        (one, other) => one.or(other),
-    };
-    let moved = average(change(west), change(north));
-    let beside = match (known(key, west), known(key, north), known(key, north_west)) {
-        (Some(w), Some(n), Some(nw)) => Some(w.wrapping_add(n).wrapping_sub(nw)),
-        (w, n, _) => average(w, n),
-    };
-    let (predicted, class) = match (held, moved, beside) {
-        (Some(held), Some(moved), _) => (held.wrapping_add(moved), 0usize),
-        (Some(held), None, _) => (held, 1),
-        (None, _, Some(beside)) => (beside, 2),
-        (None, _, None) => (0, 3),
-    };
-    let predicted = i32::from(field_code(predicted));
-    let wanted = i32::from(source.field(spot.node, spot.label, which));
-    let at = class.wrapping_mul(NUMBER_CONTEXTS);
-    let Some(contexts) = contexts.get_mut(at..) else { return 0 };
-    let code = predicted.wrapping_add(coder::number(bits, contexts, wanted.wrapping_sub(predicted)));
-    code.clamp(-MAX_FIELD, MAX_FIELD) as i8
+/// A field of zero is one that nothing is known about: its layer was not tested.
+fn known_distance(code: i8) -> Option<i32> {
+    let distance = field_distance(code);
+    (distance != 0).then_some(distance)
+}
+
+fn known_at(codes: &[i8], index: Option<usize>) -> Option<i32> {
+    known_distance(*codes.get(index?)?)
+}
+
+/// What is known of a field as a chain is walked.
+struct Known<'k> {
+    /// The row at the key before, and the one above it, with that key's codes.
+    held: Option<(Line<'k>, &'k [i8])>,
+    held_above: Option<(Line<'k>, &'k [i8])>,
+    /// The row above at this key.
+    north: Line<'k>,
+    /// The last node with a field.
+    last: Option<Last>,
+}
+
+/// What a field was, and what it was told from.
+#[derive(Clone, Copy)]
+struct Last {
+    column: u16,
+    now: Option<i32>,
+    held: Option<i32>,
+    north: Option<i32>,
+}
+
+/// What a field is told from: distances at the key before, there and to the west and north, and at this key around it.
+struct Told {
+    held: Option<i32>,
+    held_west: Option<i32>,
+    held_north: Option<i32>,
+    west: Option<i32>,
+    north: Option<i32>,
+    north_west: Option<i32>,
+}
+
+impl Known<'_> {
+    /// What is known at node `column`, which is to the right of the last one, given the key's `codes`.
+    fn told(&mut self, codes: &[i8], column: u16) -> Told {
+        let before = column.checked_sub(1);
+        let last = self.last.filter(|last| Some(last.column) == before);
+        // A node without a field is passed by: what is north of it may have one.
+        let passed = if last.is_none() { before.and_then(|before| self.north.field(before)) } else { None };
+        let north_west = last.map_or_else(|| known_at(codes, passed), |last| last.north);
+        let past = |line: &mut Option<(Line<'_>, &[i8])>| line.as_mut().and_then(|(line, codes)| known_at(codes, line.field(column)));
+        Told {
+            held: past(&mut self.held),
+            held_west: last.and_then(|last| last.held),
+            held_north: past(&mut self.held_above),
+            west: last.and_then(|last| last.now),
+            north: known_at(codes, self.north.field(column)),
+            north_west,
+        }
+    }
+}
+
+impl Told {
+    /// The distance, from the key before and how the same field changed at the nodes west and north of it, and the class of that.
+    fn prediction(&self) -> (i32, usize) {
+        let average = |a: Option<i32>, b: Option<i32>| match (a, b) {
+            (Some(a), Some(b)) => Some(a.wrapping_add(b) >> 1),
+            (one, other) => one.or(other),
+        };
+        let change = |now: Option<i32>, then: Option<i32>| now.zip(then).map(|(now, then)| now.wrapping_sub(then));
+        let moved = average(change(self.west, self.held_west), change(self.north, self.held_north));
+        let beside = match (self.west, self.north, self.north_west) {
+            (Some(w), Some(n), Some(nw)) => Some(w.wrapping_add(n).wrapping_sub(nw)),
+            (w, n, _) => average(w, n),
+        };
+        match (self.held, moved, beside) {
+            (Some(held), Some(moved), _) => (held.wrapping_add(moved), 0),
+            (Some(held), None, _) => (held, 1),
+            (None, _, Some(beside)) => (beside, 2),
+            (None, _, None) => (0, 3),
+        }
+    }
 }

@@ -1,5 +1,5 @@
 //! One key's layers in the caller's memory, and what their coding is told: the setting they are coded in, what an encoder
-//! wants to say. `nodes` walks the layers; `predict` and `field` code them; `cell` interpolates between two keys.
+//! wants to say. `nodes` lays out the chains; `predict` and `field` code their layers; `row` interpolates between keys.
 
 use crate::coder::Probability;
 use crate::fixed::{KeyUv, field_distance};
@@ -7,33 +7,59 @@ use crate::grid::Grid;
 use crate::lists::{Lists, Sheets};
 use crate::plane::{PLANE_BYTES, View};
 
-/// One key's layers in caller's memory, node by node, labels ascending.
-#[derive(Debug, Default)]
-pub struct Key<'m> {
-    /// Where each node's layers start; one entry more than nodes.
-    pub start: &'m mut [u16],
-    /// The layers' labels.
-    pub label: &'m mut [u8],
-    /// The layers' positions, [`KeyUv`] each.
-    pub uv: &'m mut [u32],
-    /// The layers' fields, as codes (see [`field_distance`]); empty where the bundle has none. Layers that no cell tests hold zeros.
-    pub fields: [&'m mut [i8]; 2],
+/// No place.
+pub const NONE: u16 = u16::MAX;
+
+/// Layers of one label at neighbouring nodes of a row, one at each, in caller's memory. They stand side by side.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Chain {
+    /// The first node, from the left of the grid.
+    pub first: u16,
+    /// The one after the last.
+    pub end: u16,
+    /// The first layer.
+    pub at: u16,
+    /// Where the fields of the first layer stand; [`NONE`]: no cell tests any of the chain's layers.
+    pub field: u16,
+    /// The label.
+    pub label: u16,
 }
 
-impl Key<'_> {
-    /// The index of the first layer of `node` and the labels of its layers.
+impl Chain {
+    /// How many layers it has.
     #[must_use]
-    pub fn node(&self, node: usize) -> (usize, &[u8]) {
-        let at = |node: usize| self.start.get(node).map_or(0, |&at| usize::from(at));
-        let (from, to) = (at(node), at(node.wrapping_add(1)));
-        (from, self.label.get(from..to).unwrap_or(&[]))
+    pub const fn nodes(&self) -> u16 {
+        self.end.wrapping_sub(self.first)
+    }
+}
+
+/// One key's layers in caller's memory: row by row of nodes, in a row chain by chain, by label and from left to right.
+#[derive(Debug, Default)]
+pub struct Key<'m> {
+    /// Where each row's chains start; one entry more than rows.
+    pub row: &'m mut [u16],
+    /// The chains.
+    pub chain: &'m mut [Chain],
+    /// The layers' positions, [`KeyUv`] each.
+    pub uv: &'m mut [u32],
+    /// The fields of chains that some cell tests, as codes (see [`field_distance`]); layers that none tests hold zeros.
+    pub fields: [&'m mut [i8]; 2],
+    /// Layers, and fields, of the rows so far.
+    pub(crate) used: [usize; 2],
+}
+
+impl<'m> Key<'m> {
+    /// A key in this memory: a row more than the grid has rows of nodes, as many chains, layers and tested layers as a key has at most.
+    #[must_use]
+    pub const fn new(row: &'m mut [u16], chain: &'m mut [Chain], uv: &'m mut [u32], fields: [&'m mut [i8]; 2]) -> Self {
+        Self { row, chain, uv, fields, used: [0; 2] }
     }
 
-    /// The index of the layer of `label` at `node`.
+    /// The chains of row `row`; none outside the grid.
     #[must_use]
-    pub fn find(&self, node: usize, label: u8) -> Option<usize> {
-        let (from, labels) = self.node(node);
-        labels.iter().position(|&l| l == label).map(|i| from.wrapping_add(i))
+    pub fn chains(&self, row: usize) -> &[Chain] {
+        of_row(self.row, self.chain, row)
     }
 
     /// The position of layer `index`; past the last, the least there is.
@@ -42,17 +68,82 @@ impl Key<'_> {
         KeyUv(self.uv.get(index).copied().unwrap_or(0))
     }
 
-    /// The fields of layer `index`, Q8 pixels; 0 where it has none.
+    /// The fields of the `along`-th layer of `chain`, Q8 pixels; 0 where it has none.
     #[must_use]
-    pub fn field(&self, index: usize) -> [i32; 2] {
+    pub fn field(&self, chain: &Chain, along: u16) -> [i32; 2] {
         let [a, b] = &self.fields;
-        let distance = |codes: &[i8]| codes.get(index).map_or(0, |&code| field_distance(code));
+        let index = usize::from(chain.field.saturating_add(along));
+        let distance = |codes: &[i8]| codes.get(index).filter(|_| chain.field != NONE).map_or(0, |&code| field_distance(code));
         [distance(a), distance(b)]
     }
 
-    /// u and v of the layer of `label` at `node`, stored units.
-    pub(crate) fn position(&self, node: usize, label: u8) -> Option<[i32; 2]> {
-        self.find(node, label).map(|index| self.uv(index)).map(|uv| [uv.u(), uv.v()])
+    /// Layers, and fields, that it holds.
+    #[must_use]
+    pub const fn held(&self) -> [usize; 2] {
+        self.used
+    }
+}
+
+/// The chains of row `row`, where `rows` start at these of the `chains`.
+pub(crate) fn of_row<'k>(rows: &[u16], chains: &'k [Chain], row: usize) -> &'k [Chain] {
+    let at = |row: usize| rows.get(row).map(|&at| usize::from(at));
+    let range = at(row).zip(at(row.wrapping_add(1)));
+    range.and_then(|(from, to)| chains.get(from..to)).unwrap_or(&[])
+}
+
+/// The layers of one label in a row, looked up from left to right.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Line<'k> {
+    /// The chain that is looked at, and those to come.
+    chain: Chain,
+    rest: &'k [Chain],
+}
+
+impl<'k> Line<'k> {
+    /// What a row without chains of the label has: it ends past every node, and begins there.
+    const NOTHING: Chain = Chain { first: NONE, end: NONE, at: 0, field: NONE, label: 0 };
+
+    /// The layers of `label` among the `chains` of a row.
+    pub fn new(chains: &'k [Chain], label: u8) -> Self {
+        let from = chains.partition_point(|chain| chain.label < label.into());
+        let rest = chains.get(from..).unwrap_or(&[]);
+        let mut line = Self { chain: Chain { label: label.into(), ..Self::NOTHING }, rest };
+        line.next();
+        line
+    }
+
+    fn next(&mut self) {
+        let label = self.chain.label;
+        self.chain = match self.rest.split_first() {
+            Some((&chain, rest)) if chain.label == label => {
+                self.rest = rest;
+                chain
+            }
+            _ => Chain { label, ..Self::NOTHING },
+        };
+    }
+
+    /// How far along its chain the layer at node `column` is.
+    #[inline(always)]
+    fn along(&mut self, column: u16) -> Option<u16> {
+        while column >= self.chain.end && self.chain.end != NONE {
+            self.next();
+        }
+        column.checked_sub(self.chain.first)
+    }
+
+    /// The layer at node `column`, which is not to the left of the last one that was asked for.
+    #[inline(always)]
+    pub fn layer(&mut self, column: u16) -> Option<usize> {
+        let along = self.along(column)?;
+        Some(usize::from(self.chain.at).wrapping_add(usize::from(along)))
+    }
+
+    /// Likewise where its fields stand.
+    #[inline(always)]
+    pub fn field(&mut self, column: u16) -> Option<usize> {
+        let along = self.along(column)?;
+        (self.chain.field != NONE).then(|| usize::from(self.chain.field).wrapping_add(usize::from(along)))
     }
 }
 
@@ -108,15 +199,4 @@ pub struct Setting<'s, 'm, L> {
     pub planes: &'s [[u8; PLANE_BYTES]],
     /// How this key sees each plane.
     pub views: &'s [View],
-}
-
-/// Where a layer stands.
-pub(crate) struct Spot {
-    /// The node's index, row and column.
-    pub node: usize,
-    pub row: usize,
-    pub column: usize,
-    /// The layer's label, and its index in the key.
-    pub label: u8,
-    pub layer: usize,
 }

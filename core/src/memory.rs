@@ -6,13 +6,13 @@ use crate::atlas::Texture;
 use crate::coder::{Decoder, Probability};
 use crate::coverage::Chart;
 use crate::format::{self, SPACE_CUBIC, TexelKind};
-use crate::key::Key;
+use crate::key::{Chain, Key};
 use crate::lists::{self, Lists};
-use crate::nodes;
+use crate::nodes::{self, Layout};
 use crate::pack::{self, Picture, Recent, Scratch};
 use crate::plan::{Mixed, Plan, Run, TILE_LOG2, Tile};
 use crate::record::Stream;
-use crate::row::{Chain, NodeRow, Piece, Point};
+use crate::row::{NodeRow, Point};
 use crate::sheet::{RowSheets, Sheet, Stretch};
 use bytemuck::Pod;
 
@@ -32,8 +32,6 @@ pub struct Workspace<'m> {
     pub rows: [NodeRow<'m>; 4],
     /// Where space is cubic, what lies halfway down the row of cells.
     pub halfway: NodeRow<'m>,
-    /// What a row of nodes is put together from.
-    pub pieces: &'m mut [Piece],
     /// The sheets of the current row of cells.
     pub sheets: RowSheets<'m>,
     /// What the current strip of it shows.
@@ -108,10 +106,13 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, texture: Texture<'m>) -
     let blocks = grid.columns.saturating_mul(if cubic { 2 } else { 1 });
     let tiles = grid.columns.checked_shl(grid.log2.saturating_sub(block_log2.min(TILE_LOG2))).unwrap_or(0);
     let row_sheets = usize::from(limits.row_sheets);
-    let node_row = |cutter: &mut Cutter<'m>, wanted: bool, fields: bool| {
+    let row_chains = usize::from(limits.row_chains);
+    // A row at one moment has its chains cut where either end of the interval ends one; halfway, where either row does.
+    let node_row = |cutter: &mut Cutter<'m>, wanted: bool, cuts: usize, fields: bool| {
         let if_wanted = |count: usize| if wanted { count } else { 0 };
+        let chains = row_chains.saturating_mul(cuts).min(row_layers);
         NodeRow {
-            chain: cutter.take::<Chain>(if_wanted(row_layers)),
+            chain: cutter.take::<Chain>(if_wanted(chains)),
             chains: 0,
             head: cutter.take(if_wanted(bundle.label_count())),
             point: cutter.take::<Point>(if_wanted(row_layers)),
@@ -119,22 +120,32 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, texture: Texture<'m>) -
             field: cutter.take::<[i16; 2]>(if fields { if_wanted(row_layers) } else { 0 }),
         }
     };
+    // What does not change from frame to frame is made ready here, before what is returned takes room on the stack.
+    let (palette, charts) = (cutter.take(bundle.texel_kind().colours()), cutter.take(bundle.label_count()));
+    colours(palette, bundle, false);
+    for (label, chart) in (0..=u8::MAX).zip(charts.iter_mut()) {
+        *chart = Chart::new(&bundle.label(label));
+    }
     Workspace {
         texture,
-        palette: cutter.take(bundle.texel_kind().colours()),
-        charts: cutter.take(bundle.label_count()),
+        palette,
+        charts,
         stream: Stream {
             list_contexts: cutter.take(lists::CONTEXTS),
             key_contexts: cutter.take(nodes::CONTEXTS),
-            traces: cutter.take(row_layers.saturating_mul(2)),
+            layout: Layout {
+                traces: cutter.take(row_layers.saturating_mul(2)),
+                marks: cutter.take(row_layers),
+                order: cutter.take(row_chains),
+            },
             views: cutter.take(bundle.planes().len()),
             keys: core::array::from_fn(|slot| match slot < slots {
-                true => Key {
-                    start: cutter.take(one_more(grid.nodes())),
-                    label: cutter.take(key_layers),
-                    uv: cutter.take(key_layers),
-                    fields: core::array::from_fn(|which| cutter.take(if which < fields { key_layers } else { 0 })),
-                },
+                true => Key::new(
+                    cutter.take(one_more(grid.node_rows())),
+                    cutter.take(limits.key_chains.into()),
+                    cutter.take(key_layers),
+                    core::array::from_fn(|which| cutter.take(if which < fields { limits.key_fields.into() } else { 0 })),
+                ),
                 false => Key::default(),
             }),
             slots,
@@ -147,9 +158,8 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, texture: Texture<'m>) -
                 false => Lists::default(),
             }),
         },
-        rows: core::array::from_fn(|row| node_row(cutter, cubic || row == 1 || row == 2, fields > 0)),
-        halfway: node_row(cutter, cubic, false),
-        pieces: cutter.take::<Piece>(row_layers),
+        rows: core::array::from_fn(|row| node_row(cutter, cubic || row == 1 || row == 2, 2, fields > 0)),
+        halfway: node_row(cutter, cubic, 4, false),
         sheets: RowSheets { stretch: cutter.take::<Stretch>(grid.columns), stretches: 0, sheet: cutter.take::<Sheet>(row_sheets) },
         plan: Plan {
             tile: cutter.take::<Tile>(tiles),
@@ -171,6 +181,7 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, texture: Texture<'m>) -
 impl Bundle<'_> {
     /// Bytes of working memory that a player of this bundle asks for, at any alignment.
     #[must_use]
+    #[inline(never)]
     pub fn memory_needed(&self) -> usize {
         let mut counter = Cutter::new(&mut []);
         let texture = picture(self, &mut counter, |_, _, _| {});
@@ -179,7 +190,18 @@ impl Bundle<'_> {
     }
 }
 
-/// `memory` cut up for `bundle`, whose source image `unpack` unpacks if it is packed; slices of nothing where it is too small.
+/// Fills `palette` with the colours of `bundle`, their bytes `swapped` or not.
+pub fn colours(palette: &mut [u16], bundle: &Bundle<'_>, swapped: bool) {
+    // A texel past the palette's end must not show what the caller's memory held.
+    palette.fill(0);
+    let (colours, _) = bundle.atlas().palette.as_chunks::<2>();
+    for (entry, bytes) in palette.iter_mut().zip(colours) {
+        let colour = u16::from_le_bytes(*bytes);
+        *entry = if swapped { colour.swap_bytes() } else { colour };
+    }
+}
+
+/// `memory` cut up for `bundle`, whose source image `unpack` unpacks if it is packed, slices of nothing where it is too small.
 #[inline(never)]
 pub fn workspace<'m>(
     bundle: &Bundle<'m>,

@@ -1,6 +1,6 @@
-//! The layers of a key, node by node: which labels each node carries follows from the sheet lists around it; positions are
-//! coded by `predict`, fields by `field`. Described once, for decoder and encoder alike: bits come from (or go to)
-//! `coder`, layers go to the caller's memory as a `key`.
+//! The layers of a key, row by row: which labels each node carries follows from the sheet lists around it, and with it which
+//! chains a row has; positions are coded by `predict`, fields by `field`. Described once, for decoder and encoder alike: bits come from
+//! (or go to) `coder`, layers go to the caller's memory as a `key`.
 //!
 //! A node carries one layer for every label in the lists of the cells that touch it, in the interval before its key and
 //! in the one after.
@@ -8,7 +8,7 @@
 use crate::coder::{Bits, Probability};
 use crate::field;
 use crate::format::{LabelRecord, MAX_NODE_LAYERS};
-use crate::key::{Key, Setting, Source, Spot};
+use crate::key::{Chain, Key, NONE, Setting, Source};
 use crate::lists::{CHART, Cursor, Lists, SheetsRef};
 use crate::predict;
 pub use crate::predict::Trace;
@@ -17,58 +17,185 @@ use heapless::Vec;
 /// Contexts a key is coded with: for positions, then for fields.
 pub const CONTEXTS: usize = predict::CONTEXTS + field::CONTEXTS;
 
+/// What a row of nodes is laid out with, in caller's memory.
+#[derive(Debug, Default)]
+pub struct Layout<'m> {
+    /// Room for the layers of two rows of nodes, half of it each: what their coding leaves behind.
+    pub traces: &'m mut [Trace],
+    /// Room for as many as a row has layers.
+    pub marks: &'m mut [Mark],
+    /// Room for one a chain of a row.
+    pub order: &'m mut [u16],
+}
+
+/// Layers of a chain that are alike, in the order in which they are found.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Mark {
+    /// The chain, counted as they begin.
+    chain: u16,
+    nodes: u16,
+    /// Of [`Trace::marked`].
+    marks: u16,
+}
+
 /// Codes the layers of one `row` of a key's nodes into `target`, which holds those of the rows above, in `contexts` ([`CONTEXTS`] of
-/// them). `traces` holds two rows of nodes' worth of [`Trace`]s, half of it each.
+/// them).
 pub fn code_row<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
     bits: &mut B,
     contexts: &mut [Probability],
     setting: &Setting<'_, '_, L>,
     target: &mut Key<'_>,
-    traces: &mut [Trace],
+    layout: &mut Layout<'_>,
     row: usize,
     source: &mut S,
 ) {
-    let grid = setting.grid;
     let Some((positions, fields)) = contexts.split_at_mut_checked(predict::CONTEXTS) else { return };
-    let mut node = row.wrapping_mul(grid.node_columns());
-    // The row above has left where it ends: what is coded needs no memory of its own from row to row.
-    let mut layer = if row == 0 { 0 } else { target.start.get(node).map_or(0, |&at| usize::from(at)) };
-    let mut around = Corner::new(setting.lists, row);
-    let row_start = layer;
-    for column in 0..grid.node_columns() {
-        if let Some(start) = target.start.get_mut(node) {
-            *start = layer as u16;
+    lay_out(setting, target, layout, row);
+    let chains = target.chains(row).len();
+    let first = target.row.get(row).map_or(0, |&at| usize::from(at));
+    for index in first..first.wrapping_add(chains) {
+        let Some(&chain) = target.chain.get(index) else { break };
+        predict::code(bits, positions, setting, target, layout.traces, row, chain, source);
+        if chain.field != NONE {
+            field::code(bits, fields, setting, target, layout.traces, row, chain, source);
         }
-        let mut labels: Vec<Found, MAX_NODE_LAYERS> = Vec::new();
-        around.labels(column < grid.columns, &mut labels);
-        let end = layer.wrapping_add(labels.len());
-        // A node that breaks the key's bound carries nothing.
-        let fits = end <= target.label.len() && end.wrapping_sub(row_start) <= traces.len() / 2;
-        if !fits {
-            labels.clear();
+    }
+}
+
+/// Finds the chains of `row`, and marks its layers' traces with what the lists say about them. What breaks the key's bounds is left out.
+#[inline(never)]
+fn lay_out<L>(setting: &Setting<'_, '_, L>, target: &mut Key<'_>, layout: &mut Layout<'_>, row: usize) {
+    if row == 0 {
+        target.used = [0; 2];
+        target.row.fill(0);
+    }
+    let first = target.row.get(row).map_or(0, |&at| usize::from(at));
+    let [layers, fields] = target.used;
+    let half = layout.traces.len() / 2;
+    let room = target.uv.len().saturating_sub(layers).min(half);
+    let free = target.chain.get_mut(first..).unwrap_or(&mut []);
+    let most = free.len().min(layout.order.len());
+    let chains = free.get_mut(..most).unwrap_or(&mut []);
+    let mut found = Finding { chains, count: 0, marks: &mut *layout.marks, marked: 0, room };
+    found.walk(setting, row);
+    let Finding { count, marked, .. } = found;
+    let Some(chains) = free.get_mut(..count) else { return };
+    // By label: then rows are gone through side by side. Where each stands, by the order in which they begin, is what marks want.
+    for (place, chain) in (0..).zip(&mut *chains) {
+        chain.at = place;
+    }
+    sort(chains);
+    let (mut layer, mut field) = (layers, fields);
+    for chain in chains {
+        let nodes = usize::from(chain.nodes());
+        if let Some(place) = layout.order.get_mut(usize::from(chain.at)) {
+            *place = layer.wrapping_sub(layers) as u16;
         }
-        for (index, found) in (layer..).zip(&labels) {
-            if let Some(slot) = target.label.get_mut(index) {
-                *slot = found.label;
+        chain.at = layer as u16;
+        layer = layer.wrapping_add(nodes);
+        if chain.field != NONE {
+            let end = field.wrapping_add(nodes);
+            let fits = target.fields.first().is_some_and(|codes| end <= codes.len());
+            (chain.field, field) = if fits { (field as u16, end) } else { (NONE, field) };
+        }
+    }
+    target.used = [layer, field];
+    if let Some(next) = target.row.get_mut(row.wrapping_add(1)) {
+        *next = first.wrapping_add(count) as u16;
+    }
+    let (even, odd) = layout.traces.split_at_mut(half);
+    let traces = if row & 1 == 0 { even } else { odd };
+    for mark in layout.marks.get(..marked).unwrap_or(&[]) {
+        let Some(place) = layout.order.get_mut(usize::from(mark.chain)) else { break };
+        let end = place.wrapping_add(mark.nodes);
+        for trace in traces.get_mut(usize::from(*place)..usize::from(end)).unwrap_or(&mut []) {
+            *trace = Trace::marked(mark.marks);
+        }
+        *place = end;
+    }
+}
+
+/// Sorts chains by label; those of one label stay in order. There are a few, nearly in order.
+fn sort(chains: &mut [Chain]) {
+    for end in 1..chains.len() {
+        let mut at = end;
+        while let Some([left, right]) = at.checked_sub(1).and_then(|before| chains.get_mut(before..)?.first_chunk_mut::<2>()) {
+            if left.label <= right.label {
+                break;
             }
+            core::mem::swap(left, right);
+            at = at.wrapping_sub(1);
         }
-        if let Some(start) = target.start.get_mut(node.wrapping_add(1)) {
-            *start = layer.wrapping_add(labels.len()) as u16;
-        }
-        for found in &labels {
-            let spot = Spot { node, row, column, label: found.label, layer };
-            let coded = predict::code(bits, positions, setting, target, traces, &spot, found.support, source);
-            if let Some(slot) = target.uv.get_mut(layer) {
-                *slot = coded.0;
+    }
+}
+
+/// The chains of a row as they are found, from left to right.
+struct Finding<'f> {
+    chains: &'f mut [Chain],
+    count: usize,
+    marks: &'f mut [Mark],
+    marked: usize,
+    /// Layers that there is room for.
+    room: usize,
+}
+
+impl Finding<'_> {
+    /// Goes through the nodes of `row`.
+    fn walk<L>(&mut self, setting: &Setting<'_, '_, L>, row: usize) {
+        let grid = setting.grid;
+        let mut around = Corner::new(setting.lists, row);
+        // The chains that the last node is part of, by label.
+        let mut open: Vec<u16, MAX_NODE_LAYERS> = Vec::new();
+        let mut column = 0usize;
+        while column < grid.node_columns() {
+            if let Some((label, support, alike)) = around.alike(grid.columns.saturating_sub(column)) {
+                let found = Found { label, support, tested: false };
+                let chain = self.put(&open, found, column as u16, alike);
+                open.clear();
+                if let Some(chain) = chain {
+                    let _ = open.push(chain);
+                }
+                column = column.wrapping_add(usize::from(alike));
+                continue;
             }
-            field::code(bits, fields, setting, target, &spot, found.tested, source);
-            layer = layer.wrapping_add(1);
+            let mut labels: Vec<Found, MAX_NODE_LAYERS> = Vec::new();
+            around.labels(column < grid.columns, &mut labels);
+            let mut next: Vec<u16, MAX_NODE_LAYERS> = Vec::new();
+            for &found in &labels {
+                if let Some(chain) = self.put(&open, found, column as u16, 1) {
+                    let _ = next.push(chain);
+                }
+            }
+            open = next;
+            column = column.wrapping_add(1);
         }
-        node = node.wrapping_add(1);
+    }
+
+    /// Puts layers at `nodes` nodes from `column` on: into one of the chains that are `open`, or into a new one. Returns which.
+    fn put(&mut self, open: &[u16], found: Found, column: u16, nodes: u16) -> Option<u16> {
+        let left = self.room.checked_sub(nodes.into())?;
+        let mark = self.marks.get_mut(self.marked)?;
+        let label = u16::from(found.label);
+        let known = open.iter().copied().find(|&chain| self.chains.get(usize::from(chain)).is_some_and(|chain| chain.label == label));
+        let index = known.unwrap_or(self.count as u16);
+        let chain = self.chains.get_mut(usize::from(index))?;
+        if known.is_none() {
+            *chain = Chain { first: column, end: column, at: 0, field: NONE, label };
+            self.count = self.count.wrapping_add(1);
+        }
+        chain.end = column.wrapping_add(nodes);
+        if found.tested {
+            chain.field = 0;
+        }
+        *mark = Mark { chain: index, nodes, marks: Trace::marks(found.support, found.tested) };
+        (self.marked, self.room) = (self.marked.wrapping_add(1), left);
+        Some(index)
     }
 }
 
 /// A label in the cells around a node.
+#[derive(Clone, Copy)]
 struct Found {
     label: u8,
     /// How many of the cells show it.
@@ -103,6 +230,34 @@ impl<'l, 'm> Corner<'l, 'm> {
             collect(sheets, found);
             *left = sheets;
         }
+    }
+
+    /// The one label that all cells around each of the next nodes show, how many cells these are, and how many nodes, `most` at most; moves past
+    /// them. `None` where the next one has others.
+    fn alike(&mut self, most: usize) -> Option<(u8, u8, u16)> {
+        let &[label] = self.left.iter().find_map(|left| left.labels.first_chunk())?;
+        let (mut alike, mut rows) = (most, 0u8);
+        for (left, right) in self.left.iter().zip(&self.right) {
+            let Some((list, cursor)) = right.filter(|(list, cursor)| !list.sheets(*cursor).labels.is_empty()) else {
+                // Beyond the grid's edge, as to the left of it.
+                if left.labels.is_empty() {
+                    continue;
+                }
+                return None;
+            };
+            if left.labels != [label] {
+                return None;
+            }
+            (alike, _) = list.alike(cursor, label, alike);
+            rows = rows.wrapping_add(1);
+        }
+        if alike == 0 || rows == 0 {
+            return None;
+        }
+        for right in self.right.iter_mut().flatten() {
+            (_, right.1) = right.0.alike(right.1, label, alike);
+        }
+        Some((label, rows.wrapping_mul(2), alike as u16))
     }
 }
 

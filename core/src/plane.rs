@@ -189,21 +189,49 @@ impl View {
     /// The position at the node in `column` and `row`, stored units; `None` where the plane is behind the eye, or far out.
     #[must_use]
     pub fn at(&self, column: usize, row: usize) -> Option<[i32; 2]> {
+        self.across(column, row).next()
+    }
+
+    /// The positions at the nodes of `row`, from `column` on.
+    #[must_use]
+    pub fn across(&self, column: usize, row: usize) -> Across {
+        // Terms are below 2^30 and there are at most 1025 nodes in a row: all are below 2^42.
         let place = [1, column as i64, row as i64];
         let [u, v, divisor] = self.terms.map(|terms| dot(terms.map(i64::from), place));
-        if divisor <= 0 {
-            return None;
-        }
-        // Terms are below 2^30 and there are at most 1025 nodes in a row: all are below 2^42.
+        let [by_u, by_v, by_divisor] = self.terms.map(|[_, column, _]| i64::from(column));
         let (up, down) = match self.scale {
             up @ 0..=20 => (up as u32, 0),
             down @ -20..0 => (0, down.unsigned_abs()),
-            _ => return None,
+            // Out of reach: no divisor is above zero.
+            _ => return Across { at: [0; 3], step: [0; 3] },
         };
-        let divisor = divisor.wrapping_shl(down);
+        let scaled = |u: i64, v: i64, divisor: i64| [u.wrapping_shl(up), v.wrapping_shl(up), divisor.wrapping_shl(down)];
+        Across { at: scaled(u, v, divisor), step: scaled(by_u, by_v, by_divisor) }
+    }
+}
+
+/// A plane's positions along a row of nodes.
+#[derive(Clone, Copy, Debug)]
+pub struct Across {
+    /// u and v times the divisor, and this; and what a column further adds.
+    at: [i64; 3],
+    step: [i64; 3],
+}
+
+impl Across {
+    /// The position at the next node, stored units; `None` where the plane is behind the eye, or far out.
+    #[inline(always)]
+    pub fn next(&mut self) -> Option<[i32; 2]> {
+        let [u, v, divisor] = self.at;
+        for (at, step) in self.at.iter_mut().zip(self.step) {
+            *at = at.wrapping_add(step);
+        }
+        if divisor <= 0 {
+            return None;
+        }
         let quotient = Quotient::new(divisor as u64);
         let axis = |numerator: i64| {
-            let numerator = numerator.wrapping_shl(up).wrapping_add(divisor >> 1);
+            let numerator = numerator.wrapping_add(divisor >> 1);
             // Rounded towards minus infinity.
             let flip = numerator >> 63;
             let position = quotient.of((numerator ^ flip) as u64)? as i32 ^ flip as i32;

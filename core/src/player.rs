@@ -42,10 +42,7 @@ impl<'a, T: Texels> Player<'a, T> {
         if given < needed {
             return Err(MemoryError::TooSmall { needed, given });
         }
-        let mut player = Self { playing: T::open(bundle, memory), texels: PhantomData };
-        // After what it took to open the bundle is off the stack.
-        player.playing.start();
-        Ok(player)
+        Ok(Self { playing: T::open(bundle, memory), texels: PhantomData })
     }
 
     /// The bundle that plays.

@@ -4,7 +4,6 @@
 use crate::Bundle;
 use crate::atlas::Texture;
 use crate::coder::Decoder;
-use crate::coverage::Chart;
 use crate::draw::{Drawing, Probes};
 use crate::format::{self, SPACE_CUBIC, TexelKind};
 use crate::key::Nothing;
@@ -111,8 +110,8 @@ pub struct Look<'t> {
 }
 
 impl<'a> Playing<'a> {
-    /// At no frame yet, before the first `seek`, over at least [`Bundle::memory_needed`] bytes of `memory`; `unpack` unpacks a packed source
-    /// image.
+    /// At frame 0, of which nothing is decoded before it is drawn, over at least [`Bundle::memory_needed`] bytes of `memory`; `unpack` unpacks a
+    /// packed source image.
     // What this returns is large: no copy of it may be left on the callers' stack.
     #[inline(never)]
     pub fn new(bundle: &'a Bundle<'a>, memory: &'a mut [u8], unpack: impl Fn(&mut Decoder<'_>, Scratch<'_>, &mut Picture<'_>)) -> Self {
@@ -129,16 +128,6 @@ impl<'a> Playing<'a> {
         }
     }
 
-    /// Makes ready what does not change from frame to frame, and frame 0 the current one.
-    #[inline(never)]
-    pub fn start(&mut self) {
-        for (label, chart) in (0..=u8::MAX).zip(self.space.charts.iter_mut()) {
-            *chart = Chart::new(&self.bundle.label(label));
-        }
-        self.set_byte_order(ByteOrder::Native);
-        self.seek(Frame(0));
-    }
-
     /// The bundle that plays.
     #[must_use]
     pub fn bundle(&self) -> &'a Bundle<'a> {
@@ -147,18 +136,12 @@ impl<'a> Playing<'a> {
 
     /// Pixels come in this byte order from now on.
     pub fn set_byte_order(&mut self, order: ByteOrder) {
-        let (colours, _) = self.bundle.atlas().palette.as_chunks::<2>();
         self.swapped = match order {
             ByteOrder::Native => false,
             ByteOrder::BigEndian => 1u16.to_be() != 1,
             ByteOrder::LittleEndian => 1u16.to_le() != 1,
         };
-        // A texel past the palette's end must not show what the caller's memory held.
-        self.space.palette.fill(0);
-        for (entry, bytes) in self.space.palette.iter_mut().zip(colours) {
-            let colour = u16::from_le_bytes(*bytes);
-            *entry = if self.swapped { colour.swap_bytes() } else { colour };
-        }
+        memory::colours(self.space.palette, self.bundle, self.swapped);
     }
 
     /// Whether pixels' bytes are in the other order than the machine's.
@@ -263,6 +246,9 @@ impl<'a> Playing<'a> {
 
     /// Loads the row of cells that row `y` is in; false below the screen.
     fn ready(&mut self, y: u32) -> bool {
+        if self.last.is_none() {
+            self.seek(self.frame);
+        }
         let row = (y >> self.bundle.grid().log2) as usize;
         let inside = y < self.bundle.size().1;
         if inside && self.loaded != Some(row) {
@@ -280,7 +266,7 @@ impl<'a> Playing<'a> {
         let age = self.needed().ahead;
         let bundle = self.bundle;
         let from = self.moment.interval as isize;
-        let Workspace { stream, rows, halfway, pieces, sheets, .. } = &mut self.space;
+        let Workspace { stream, rows, halfway, sheets, .. } = &mut self.space;
         let at = |offset: isize| {
             let inside = bundle.looping() || (0..bundle.key_count() as isize).contains(&from.wrapping_add(offset));
             stream.key(age.checked_add_signed(offset.wrapping_neg())?).filter(|_| inside)
@@ -311,7 +297,7 @@ impl<'a> Playing<'a> {
         for (place, nodes) in rows.iter_mut().enumerate().skip(known) {
             // The second row of the four is the row of cells' upper edge; the outer two are for the middles alone.
             if cubic || place == 1 || place == 2 {
-                let layers = nodes.fill(pieces, grid, row.wrapping_add(place).checked_sub(1), &around, &self.moment);
+                let layers = nodes.fill(grid, row.wrapping_add(place).checked_sub(1), &around, &self.moment);
                 self.work.layers = self.work.layers.wrapping_add(layers);
             }
         }

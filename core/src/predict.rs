@@ -1,5 +1,5 @@
-//! How the position of a layer is coded: what is already known predicts it, the rest is a residual.
-//! Layers come from `nodes`; positions go into the key, what they say about their neighbours into traces.
+//! How the positions of a chain are coded: what is already known predicts each, the rest is a residual.
+//! Chains come from `nodes`; positions go into the key, what they say about their neighbours into traces.
 //!
 //! A position is told from the same layer in the two keys before and the same label at the nodes west and north of it.
 //! Several predictors compete; the one that was best at those neighbours is used. How wrong they were there chooses the
@@ -8,96 +8,151 @@
 use crate::coder::{self, Bits, NUMBER_CONTEXTS, Probability};
 use crate::fixed::{KEY_MAX, KEY_MIN, KeyUv};
 use crate::format::{FIXED, LabelRecord};
-use crate::grid::Grid;
-use crate::key::{Key, Setting, Source, Spot};
+use crate::key::{self, Chain, Key, Line, Setting, Source};
+use crate::plane::Across;
 
 /// Competing predictors.
-const PREDICTORS: usize = 10;
+const PREDICTORS: usize = 6;
 /// Classes of how wrong the predictions were around a layer.
 const NOISE_CLASSES: usize = 9;
 /// Classes of how many of the eight cells around a node show the layer's label.
 const SUPPORT_CLASSES: usize = 2;
 /// Contexts positions are coded with.
 pub const CONTEXTS: usize = SUPPORT_CLASSES * NOISE_CLASSES * 2 * NUMBER_CONTEXTS;
+/// How far off a predictor counts that had nothing to say, steps.
+const SILENT: u32 = 40;
 
-/// Codes the position of the layer at `spot` in `contexts` ([`CONTEXTS`] of them): the best prediction, and a residual. `support` of the
-/// cells around the node show its label. Its trace joins `traces`.
-#[expect(clippy::too_many_arguments, reason = "the key's state, its memory and the layer's place are three different owners")]
+/// Codes the positions of the layers of `chain`, in row `row` of `key`, in `contexts` ([`CONTEXTS`] of them): for each the best
+/// prediction, and a residual. Their `traces` have their marks.
+#[expect(clippy::too_many_arguments, reason = "the key's state, its memory and the chain's place are three different owners")]
+#[inline(never)]
 pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
     bits: &mut B,
     contexts: &mut [Probability],
     setting: &Setting<'_, '_, L>,
-    key: &Key<'_>,
+    key: &mut Key<'_>,
     traces: &mut [Trace],
-    spot: &Spot,
-    support: u8,
+    row: usize,
+    chain: Chain,
     source: &mut S,
-) -> KeyUv {
-    let record = (setting.label)(spot.label);
+) {
+    let label = chain.label as u8;
+    let record = (setting.label)(label);
     if record.flags & FIXED != 0 {
-        return fixed(&record, spot, setting.grid.log2, setting.key_bits);
+        let from = usize::from(chain.at);
+        let slots = key.uv.get_mut(from..from.wrapping_add(chain.nodes().into())).unwrap_or(&mut []);
+        for (slot, column) in slots.iter_mut().zip(chain.first..) {
+            *slot = fixed(&record, column.into(), row, setting).0;
+        }
+        return;
     }
-    let neighbours = Neighbours::new(setting.grid, key, traces, spot);
-    let candidates = Candidates::new(setting, &neighbours, spot);
-    let (predicted, noise) = candidates.choose(&neighbours, &record, setting.key_bits);
-    let round = |x: i32| {
-        let half = (1i32 << setting.step_log2) >> 1;
-        (x.clamp(KEY_MIN, KEY_MAX).wrapping_add(half)) >> setting.step_log2 << setting.step_log2
-    };
-    let predicted = predicted.map(round);
-    let class = usize::from(support < 5).wrapping_mul(NOISE_CLASSES).wrapping_add(noise);
-    let at = class.wrapping_mul(2 * NUMBER_CONTEXTS);
-    let Some((along_u, rest)) = contexts.get_mut(at..).and_then(|c| c.split_at_mut_checked(NUMBER_CONTEXTS)) else { return KeyUv(0) };
-    let Some((along_v, _)) = rest.split_at_mut_checked(NUMBER_CONTEXTS) else { return KeyUv(0) };
-    let [u, v] = source.residual(spot.node, spot.label, predicted, [along_u, along_v]);
-    let residual = [coder::number(bits, along_u, u), coder::number(bits, along_v, v)];
-    let [u, v] = [0, 1].map(|axis: usize| {
-        let (predicted, residual) = (predicted.get(axis).copied().unwrap_or(0), residual.get(axis).copied().unwrap_or(0));
-        predicted.wrapping_add(residual.wrapping_shl(setting.step_log2))
-    });
-    let uv = KeyUv::new(u, v);
-    let trace = candidates.trace(uv, residual, setting.step_log2);
-    if let Some(slot) = trace_index(key, setting.grid, traces.len(), spot.row, spot.layer).and_then(|index| traces.get_mut(index)) {
-        *slot = trace;
+    let Key { row: rows, chain: chains, uv: positions, .. } = key;
+    let line = |row: usize| key::of_row(rows, chains, row);
+    let half = traces.len() / 2;
+    let (even, odd) = traces.split_at_mut(half);
+    let (above, here) = if row & 1 == 0 { (&*odd, even) } else { (&*even, odd) };
+    let start = line(row).first().map_or(0, |first| first.at);
+    let mut known = Known::new(setting, line, row, chain);
+    let mut place = usize::from(chain.at.wrapping_sub(start));
+    let mut node = row.wrapping_mul(setting.grid.node_columns()).wrapping_add(chain.first.into());
+    for (layer, column) in (usize::from(chain.at)..).zip(chain.first..chain.end) {
+        let west = if column == chain.first { None } else { here.get(place.wrapping_sub(1)) };
+        let around = known.around(positions, above, west, column);
+        let Some(marks) = here.get(place).map(|trace| trace.marks) else { break };
+        let candidates = known.candidates(&around, column);
+        let (predicted, noise) = candidates.choose(&around, &record, setting.key_bits);
+        let round = |x: i32| {
+            let half = (1i32 << setting.step_log2) >> 1;
+            (x.clamp(KEY_MIN, KEY_MAX).wrapping_add(half)) >> setting.step_log2 << setting.step_log2
+        };
+        let predicted = predicted.map(round);
+        let class = usize::from(marks & SUPPORTED == 0).wrapping_mul(NOISE_CLASSES).wrapping_add(noise);
+        let at = class.wrapping_mul(2 * NUMBER_CONTEXTS);
+        let Some((along_u, rest)) = contexts.get_mut(at..).and_then(|c| c.split_at_mut_checked(NUMBER_CONTEXTS)) else { break };
+        let Some((along_v, _)) = rest.split_at_mut_checked(NUMBER_CONTEXTS) else { break };
+        let [u, v] = source.residual(node, label, predicted, [along_u, along_v]);
+        let residual = [coder::number(bits, along_u, u), coder::number(bits, along_v, v)];
+        let [[u, v], [du, dv]] = [predicted, residual];
+        let uv = KeyUv::new(u.wrapping_add(du.wrapping_shl(setting.step_log2)), v.wrapping_add(dv.wrapping_shl(setting.step_log2)));
+        if let Some((slot, trace)) = positions.get_mut(layer).zip(here.get_mut(place)) {
+            *slot = uv.0;
+            *trace = candidates.trace(uv, residual, setting.step_log2, marks);
+        }
+        known.step(uv);
+        (place, node) = (place.wrapping_add(1), node.wrapping_add(1));
     }
-    uv
 }
 
 /// What the coding of a layer leaves behind for its neighbours, in caller's memory.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Trace {
-    /// How far off each predictor was, steps, saturating.
-    error: [u8; PREDICTORS],
+    /// How far off each predictor was, steps, saturating: a byte each, four in a word, the first lowest.
+    error: [u32; WORDS],
     /// Position less temporal prediction, stored units, saturating.
     correction: [i16; 2],
     /// Position less what its plane tells, stored units, saturating.
     offset: [i16; 2],
     /// The residual that was coded, steps, saturating.
-    noise: u8,
-    /// [`TEMPORAL`] and [`FLAT`].
-    known: u8,
+    noise: u16,
+    /// [`TEMPORAL`], [`FLAT`], [`SUPPORTED`] and [`TESTED`].
+    marks: u16,
 }
 
-/// [`Trace::known`]: there was a temporal prediction.
-const TEMPORAL: u8 = 1;
-/// [`Trace::known`]: there was a plane.
-const FLAT: u8 = 2;
+/// Words of predictors' errors.
+const WORDS: usize = PREDICTORS.div_ceil(4);
+/// [`Trace::marks`]: there was a temporal prediction.
+const TEMPORAL: u16 = 1;
+/// [`Trace::marks`]: there was a plane.
+const FLAT: u16 = 2;
+/// [`Trace::marks`]: most cells around the node show the label.
+const SUPPORTED: u16 = 4;
+/// [`Trace::marks`]: some cell tests the layer's fields.
+const TESTED: u16 = 8;
+
+impl Trace {
+    /// What sheet lists say of a layer: `support` cells around its node show its label, and some cell `tested` its fields.
+    pub(crate) const fn marks(support: u8, tested: bool) -> u16 {
+        (if support >= 5 { SUPPORTED } else { 0 }) | if tested { TESTED } else { 0 }
+    }
+
+    /// The trace of a layer that is not coded yet.
+    pub(crate) fn marked(marks: u16) -> Self {
+        Self { marks, ..Self::default() }
+    }
+
+    /// Some cell tests the layer's fields.
+    pub(crate) const fn tested(&self) -> bool {
+        self.marks & TESTED != 0
+    }
+}
 
 /// The position of a screen-fixed layer at a node: an affine function of the screen position.
-fn fixed(record: &LabelRecord, spot: &Spot, log2: u32, key_bits: u32) -> KeyUv {
+fn fixed<L>(record: &LabelRecord, column: usize, row: usize, setting: &Setting<'_, '_, L>) -> KeyUv {
     let along = |origin: u16, step: u16, index: usize| {
         // index << log2 <= 4096 + 32 pixels, step < 2^16 of 1/16384 texel: the product fits 2^29.
-        let offset = (index as i32).wrapping_shl(log2).wrapping_mul(i32::from(step)) >> 14u32.wrapping_sub(key_bits);
+        let offset = (index as i32).wrapping_shl(setting.grid.log2).wrapping_mul(i32::from(step)) >> 14u32.wrapping_sub(setting.key_bits);
         i32::from(origin).wrapping_add(offset)
     };
-    KeyUv::new(along(record.origin_u, record.step_u, spot.column), along(record.origin_v, record.step_v, spot.row))
+    KeyUv::new(along(record.origin_u, record.step_u, column), along(record.origin_v, record.step_v, row))
 }
 
-/// Traces of even rows of nodes are in the first half, those of odd rows in the second.
-fn trace_index(key: &Key<'_>, grid: Grid, length: usize, row: usize, layer: usize) -> Option<usize> {
-    let first = key.start.get(row.wrapping_mul(grid.node_columns())).map(|&at| usize::from(at))?;
-    Some(layer.wrapping_sub(first).wrapping_add(if row & 1 == 1 { length / 2 } else { 0 }))
+/// What is known of a chain's label as its nodes are walked.
+struct Known<'k> {
+    /// The key before, and the one before that with how far things move on from there (see [`Setting::before_that`]).
+    held: Option<(Line<'k>, &'k [u32])>,
+    older: Option<(Line<'k>, &'k [u32], i32)>,
+    /// The row above, where its layers start, and the row above that.
+    north: Line<'k>,
+    start: usize,
+    far_north: Line<'k>,
+    /// The layers north-west and north of the node.
+    behind: Option<usize>,
+    over: Option<usize>,
+    /// The positions one and two nodes to the west.
+    west: [Option<[i32; 2]>; 2],
+    /// Where the label's plane is seen.
+    plane: Option<Across>,
 }
 
 /// A layer of the same label at a neighbouring node.
@@ -115,39 +170,87 @@ struct Neighbours<'t> {
 }
 
 impl<'t> Neighbours<'t> {
-    fn new(grid: Grid, key: &Key<'_>, traces: &'t [Trace], spot: &Spot) -> Self {
-        let width = grid.node_columns();
-        let near = |node: usize, row: usize| {
-            let layer = key.find(node, spot.label)?;
-            let uv = key.uv(layer);
-            let trace = traces.get(trace_index(key, grid, traces.len(), row, layer)?)?;
-            Some(Neighbour { uv: [uv.u(), uv.v()], trace })
-        };
-        let far = |node: usize| key.position(node, spot.label);
-        let (node, left, up) = (spot.node, spot.column > 0, spot.row > 0);
-        let (north, above) = (node.wrapping_sub(width), spot.row.wrapping_sub(1));
-        let west = if left { near(node.wrapping_sub(1), spot.row) } else { None };
-        let [north_east, north_west] = [
-            if up && spot.column.wrapping_add(1) < width { near(north.wrapping_add(1), above) } else { None },
-            if up && left { near(north.wrapping_sub(1), above) } else { None },
-        ];
-        let direct = if up { near(north, above) } else { None };
-        // Those further on count with the ones before them alone.
+    fn all(&self) -> impl Iterator<Item = &Neighbour<'t>> {
+        self.near.iter().flatten()
+    }
+
+    /// Where a layer may be that no predictor has an answer for: the mean of its neighbours, or without any the middle of its chart.
+    #[inline(never)]
+    fn guess(&self, record: &LabelRecord, key_bits: u32) -> [i32; 2] {
+        let mut positions = Sum::default();
+        self.all().for_each(|n| positions.add(n.uv));
+        positions.mean().unwrap_or_else(|| {
+            let middle = |a: u16, b: u16| i32::from(a).wrapping_add(i32::from(b)).wrapping_shl(key_bits) >> 1;
+            [middle(record.left, record.right), middle(record.top, record.bottom)]
+        })
+    }
+}
+
+fn pair(uv: KeyUv) -> [i32; 2] {
+    [uv.u(), uv.v()]
+}
+
+impl<'k> Known<'k> {
+    fn new<L>(setting: &Setting<'k, '_, L>, line: impl Fn(usize) -> &'k [Chain], row: usize, chain: Chain) -> Self {
+        let label = chain.label as u8;
+        let above = row.checked_sub(1).map_or(&[][..], &line);
+        let mut north = Line::new(above, label);
+        let behind = chain.first.checked_sub(1).and_then(|column| north.layer(column));
+        let over = north.layer(chain.first);
+        let plane = setting.planes.binary_search_by_key(&label, |[label, ..]| *label).ok().and_then(|plane| setting.views.get(plane));
         Self {
-            far_west: if west.is_some() && spot.column > 1 { far(node.wrapping_sub(2)) } else { None },
-            far_north: if direct.is_some() && spot.row > 1 { far(north.wrapping_sub(width)) } else { None },
-            near: [west, direct, north_east, north_west],
+            held: setting.before.map(|key| (Line::new(key.chains(row), label), &*key.uv)),
+            older: setting.before_that.map(|(key, ratio)| (Line::new(key.chains(row), label), &*key.uv, ratio)),
+            north,
+            start: above.first().map_or(0, |first| first.at.into()),
+            far_north: Line::new(row.checked_sub(2).map_or(&[][..], &line), label),
+            behind,
+            over,
+            west: [None; 2],
+            plane: plane.map(|view| view.across(chain.first.into(), row)),
         }
     }
 
-    fn all(&self) -> impl Iterator<Item = &Neighbour<'t>> {
-        self.near.iter().flatten()
+    /// The neighbours of the node in `column`, given the key's `positions`, the traces of the row `above` and of the node to the `west`.
+    #[inline(always)]
+    fn around<'t>(&mut self, positions: &[u32], above: &'t [Trace], west: Option<&'t Trace>, column: u16) -> Neighbours<'t> {
+        let ahead = self.north.layer(column.wrapping_add(1));
+        let position = |layer: usize| Some(pair(KeyUv(*positions.get(layer)?)));
+        let near = |layer: Option<usize>| {
+            let trace = above.get(layer?.wrapping_sub(self.start))?;
+            Some(Neighbour { uv: position(layer?)?, trace })
+        };
+        let [west_uv, far_west] = self.west;
+        let west = west_uv.zip(west).map(|(uv, trace)| Neighbour { uv, trace });
+        let near = [west, near(self.over), near(ahead), near(self.behind)];
+        let far_north = if self.over.is_some() { self.far_north.layer(column).and_then(position) } else { None };
+        (self.behind, self.over) = (self.over, ahead);
+        Neighbours { near, far_west, far_north }
+    }
+
+    /// On to the next node, from one whose layer is at `uv`.
+    #[inline(always)]
+    fn step(&mut self, uv: KeyUv) {
+        let [west, _] = self.west;
+        self.west = [Some(pair(uv)), west];
+    }
+
+    /// What the predictors say of the node in `column`.
+    #[inline(always)]
+    fn candidates(&mut self, around: &Neighbours<'_>, column: u16) -> Candidates {
+        let at = |(line, uv): (&mut Line<'_>, &[u32])| Some(pair(KeyUv(*uv.get(line.layer(column)?)?)));
+        let held = self.held.as_mut().and_then(|(line, uv)| at((line, uv)));
+        let older = self.older.as_mut().and_then(|(line, uv, ratio)| Some((at((line, uv))?, *ratio)));
+        let flat = self.plane.as_mut().and_then(Across::next);
+        Candidates::new(around, held, older, flat)
     }
 }
 
 /// The predictors' answers.
 struct Candidates {
-    uv: [Option<[i32; 2]>; PREDICTORS],
+    uv: [[i32; 2]; PREDICTORS],
+    /// Which of them there are, a bit each.
+    known: u32,
     temporal: Option<[i32; 2]>,
     flat: Option<[i32; 2]>,
 }
@@ -166,88 +269,106 @@ fn minus(a: [i32; 2], b: [i32; 2]) -> [i32; 2] {
 #[derive(Clone, Copy, Default)]
 struct Sum {
     sum: [i32; 2],
+    first: [i32; 2],
     count: u32,
 }
 
 impl Sum {
+    #[inline(always)]
     fn add(&mut self, value: [i32; 2]) {
+        if self.count == 0 {
+            self.first = value;
+        }
         (self.sum, self.count) = (plus(self.sum, value), self.count.wrapping_add(1));
     }
 
-    /// The mean, rounded towards minus infinity. Divisions are by known numbers: not every processor has another.
+    /// The mean, rounded towards minus infinity; of three values the first counts twice, since small processors do not divide.
+    #[inline(always)]
     fn mean(self) -> Option<[i32; 2]> {
         match self.count {
             0 => None,
             1 => Some(self.sum),
             2 => Some(self.sum.map(|x| x >> 1)),
-            3 => Some(self.sum.map(|x| x.div_euclid(3))),
+            3 => Some(plus(self.sum, self.first).map(|x| x >> 2)),
             _ => Some(self.sum.map(|x| x >> 2)),
         }
     }
 }
 
 impl Candidates {
-    fn new<L>(setting: &Setting<'_, '_, L>, around: &Neighbours<'_>, spot: &Spot) -> Self {
-        let held = setting.before.and_then(|k| k.position(spot.node, spot.label));
-        let older = setting.before_that.and_then(|(k, ratio)| Some((k.position(spot.node, spot.label)?, ratio)));
+    #[inline(always)]
+    fn new(around: &Neighbours<'_>, held: Option<[i32; 2]>, older: Option<([i32; 2], i32)>, flat: Option<[i32; 2]>) -> Self {
         let temporal = held.map(|held| match older {
             // Positions differ by less than 2^16 and the ratio is at most 2^12: the product fits 2^28.
             Some((older, ratio)) => plus(held, minus(held, older).map(|d| d.wrapping_mul(ratio) >> 8)),
             None => held,
         });
         let [west, north, _, north_west] = &around.near;
-        let (mut corrections, mut offsets, mut positions) = (Sum::default(), Sum::default(), Sum::default());
+        let (mut corrections, mut offsets) = (Sum::default(), Sum::default());
         for n in around.all() {
-            positions.add(n.uv);
-            if n.trace.known & TEMPORAL != 0 {
+            if n.trace.marks & TEMPORAL != 0 {
                 corrections.add(n.trace.correction.map(i32::from));
             }
-            if n.trace.known & FLAT != 0 {
+            if n.trace.marks & FLAT != 0 {
                 offsets.add(n.trace.offset.map(i32::from));
             }
         }
-        let correction = |n: &Neighbour<'_>| (n.trace.known & TEMPORAL != 0).then(|| n.trace.correction.map(i32::from));
-        let corrected = temporal.zip(corrections.mean());
-        let plane = |w: [i32; 2], n: [i32; 2], nw: [i32; 2]| minus(plus(w, n), nw);
-        let corner = west.as_ref().zip(north.as_ref()).zip(north_west.as_ref());
-        let corner_correction = corner.and_then(|((w, n), nw)| Some(plane(correction(w)?, correction(n)?, correction(nw)?)));
+        let mut answers = Self { uv: [[0; 2]; PREDICTORS], known: 0, temporal, flat };
+        // Of equally good predictions the first is taken: what a plane tells is best where nothing else is known.
+        if let Some(flat) = flat {
+            answers.set::<0>(flat);
+            if let Some(offset) = offsets.mean() {
+                answers.set::<1>(plus(flat, offset));
+            }
+        }
+        if let Some(temporal) = temporal {
+            answers.set::<2>(temporal);
+            if let Some(correction) = corrections.mean() {
+                answers.set::<3>(plus(temporal, correction));
+            }
+        }
+        if let (Some(w), Some(n), Some(nw)) = (west, north, north_west) {
+            answers.set::<4>(minus(plus(w.uv, n.uv), nw.uv));
+        }
         let mut lines = Sum::default();
         for (near, far) in [(west, around.far_west), (north, around.far_north)] {
             if let (Some(near), Some(far)) = (near, far) {
                 lines.add(minus(plus(near.uv, near.uv), far));
             }
         }
-        let view = setting.planes.binary_search_by_key(&spot.label, |[label, ..]| *label).ok().and_then(|plane| setting.views.get(plane));
-        let flat = view.and_then(|view| view.at(spot.column, spot.row));
-        // Of equally good predictions the first is taken: what a plane tells is best where nothing else is known.
-        let uv = [
-            flat,
-            flat.zip(offsets.mean()).map(|(f, o)| plus(f, o)),
-            temporal,
-            corrected.map(|(t, c)| plus(t, c)),
-            corrected.map(|(t, c)| plus(t, c.map(|x| x >> 1))),
-            temporal.zip(corner_correction).map(|(t, c)| plus(t, c)),
-            corner.map(|((w, n), nw)| plane(w.uv, n.uv, nw.uv)),
-            lines.mean(),
-            positions.mean(),
-            older.and(held),
-        ];
-        Self { uv, temporal, flat }
+        if let Some(line) = lines.mean() {
+            answers.set::<5>(line);
+        }
+        answers
+    }
+
+    #[inline(always)]
+    fn set<const PREDICTOR: usize>(&mut self, answer: [i32; 2]) {
+        if let Some(slot) = self.uv.get_mut(PREDICTOR) {
+            *slot = answer;
+            self.known |= 1 << PREDICTOR;
+        }
     }
 
     /// The candidate that was best at the neighbours, and the class of how noisy they were.
+    #[inline(always)]
     fn choose(&self, around: &Neighbours<'_>, record: &LabelRecord, key_bits: u32) -> ([i32; 2], usize) {
-        let (mut errors, mut noise, mut count) = ([0u32; PREDICTORS], 0u32, 0u32);
+        // Errors of up to four neighbours: sums of bytes two by two, in halves of words.
+        const HALVES: u32 = 0x00ff_00ff;
+        let (mut even, mut odd) = ([0u32; WORDS], [0u32; WORDS]);
+        let (mut noise, mut count) = (0u32, 0u32);
         for n in around.all() {
-            for (sum, &error) in errors.iter_mut().zip(&n.trace.error) {
-                *sum = sum.wrapping_add(error.into());
+            for ((even, odd), error) in even.iter_mut().zip(&mut odd).zip(n.trace.error) {
+                *even = even.wrapping_add(error & HALVES);
+                *odd = odd.wrapping_add(error >> 8 & HALVES);
             }
             (noise, count) = (noise.wrapping_add(n.trace.noise.into()), count.wrapping_add(1));
         }
+        let sums = even.iter().zip(&odd).flat_map(|(even, odd)| [even & 0xffff, odd & 0xffff, even >> 16, odd >> 16]);
         let mut best: Option<(u32, [i32; 2])> = None;
-        for (candidate, error) in self.uv.iter().zip(errors) {
-            let Some(candidate) = candidate else { continue };
-            if best.is_none_or(|(least, _)| error < least) {
+        for (index, (candidate, error)) in self.uv.iter().zip(sums).enumerate() {
+            let known = self.known.wrapping_shr(index as u32) & 1 != 0;
+            if known && best.is_none_or(|(least, _)| error < least) {
                 best = Some((error, *candidate));
             }
         }
@@ -256,20 +377,24 @@ impl Candidates {
             0 => NOISE_CLASSES - 1,
             _ => [1, 2, 4, 8, 14, 26, 60].iter().take_while(|&&limit| noise.wrapping_mul(2) >= count.wrapping_mul(limit)).count(),
         };
-        let centre = || {
-            let middle = |a: u16, b: u16| i32::from(a).wrapping_add(i32::from(b)).wrapping_shl(key_bits) >> 1;
-            [middle(record.left, record.right), middle(record.top, record.bottom)]
-        };
-        (best.map_or_else(centre, |(_, uv)| uv), class)
+        (best.map_or_else(|| around.guess(record, key_bits), |(_, uv)| uv), class)
     }
 
-    fn trace(&self, uv: KeyUv, residual: [i32; 2], step_log2: u32) -> Trace {
-        let actual = [uv.u(), uv.v()];
-        let size = |d: [i32; 2]| d.iter().map(|x| x.unsigned_abs()).fold(0u32, u32::saturating_add);
-        let byte = |x: u32| x.min(255) as u8;
-        let error = self.uv.map(|candidate| candidate.map_or(40, |c| byte(size(minus(actual, c)) >> step_log2)));
+    #[inline(always)]
+    fn trace(&self, uv: KeyUv, residual: [i32; 2], step_log2: u32, marks: u16) -> Trace {
+        let actual = pair(uv);
+        let size = |[a, b]: [i32; 2]| a.unsigned_abs().saturating_add(b.unsigned_abs());
+        let mut error = [0u32; WORDS];
+        for (index, candidate) in self.uv.iter().enumerate() {
+            let known = self.known.wrapping_shr(index as u32) & 1 != 0;
+            let off = if known { (size(minus(actual, *candidate)) >> step_log2).min(255) } else { SILENT };
+            if let Some(word) = error.get_mut(index >> 2) {
+                *word |= off.wrapping_shl((index as u32 & 3) << 3);
+            }
+        }
         let from = |known: Option<[i32; 2]>| known.map_or([0, 0], |t| minus(actual, t)).map(|x| x.clamp(-32_768, 32_767) as i16);
         let known = if self.temporal.is_some() { TEMPORAL } else { 0 } | if self.flat.is_some() { FLAT } else { 0 };
-        Trace { error, correction: from(self.temporal), offset: from(self.flat), noise: byte(size(residual)), known }
+        let noise = size(residual).min(255) as u16;
+        Trace { error, correction: from(self.temporal), offset: from(self.flat), noise, marks: marks | known }
     }
 }

@@ -7,7 +7,7 @@ use crate::format::LabelRecord;
 use crate::grid::Grid;
 use crate::key::{Key, Setting, Source};
 use crate::lists::{self, Lists};
-use crate::nodes::{self, Trace};
+use crate::nodes::{self, Layout};
 use crate::plane::{Camera, PLANE_BYTES, Plane, View};
 
 /// Keys held at a time, at most: four to play a cubic interval, and the one that is being coded.
@@ -22,8 +22,8 @@ pub struct Stream<'m> {
     pub list_contexts: &'m mut [Probability],
     /// [`nodes::CONTEXTS`] of them.
     pub key_contexts: &'m mut [Probability],
-    /// Room for the layers of two rows of nodes: one trace each.
-    pub traces: &'m mut [Trace],
+    /// What rows of nodes are laid out with.
+    pub layout: Layout<'m>,
     /// Room for as many views as there are planes: how the key being coded sees them.
     pub views: &'m mut [View],
     /// The last keys and the one being coded, in a ring of the first `slots`.
@@ -148,7 +148,7 @@ impl<'m> Stream<'m> {
             code(place.has_after.then_some(&lists_after), &mut lists_before, slice, false);
         } else {
             let key_contexts = core::mem::take(&mut self.key_contexts);
-            let traces = core::mem::take(&mut self.traces);
+            let mut layout = core::mem::take(&mut self.layout);
             let [length, length_before] = place.lengths;
             let setting = Setting {
                 grid: shape.grid,
@@ -161,8 +161,9 @@ impl<'m> Stream<'m> {
                 planes: shape.planes,
                 views: self.views,
             };
-            nodes::code_row(bits, key_contexts, &setting, &mut now, traces, slice.wrapping_sub(after).wrapping_sub(before), source);
-            (self.key_contexts, self.traces) = (key_contexts, traces);
+            let row = slice.wrapping_sub(after).wrapping_sub(before);
+            nodes::code_row(bits, key_contexts, &setting, &mut now, &mut layout, row, source);
+            (self.key_contexts, self.layout) = (key_contexts, layout);
         }
         self.put(now_slot, now, [(list_slot, lists_after), (list_before_slot, lists_before)]);
     }

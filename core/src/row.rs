@@ -3,7 +3,7 @@
 
 use crate::fixed::{KEY_MIN, KeyUv, ONE, PLAY_BITS, PlayUv, WEIGHT_BITS, field_distance, middle};
 use crate::grid::Grid;
-use crate::key::Key;
+use crate::key::{Chain, Key, NONE};
 use crate::timeline::{Moment, Weights};
 
 /// A layer at one moment: a [`PlayUv`] in caller's memory.
@@ -35,9 +35,6 @@ impl Layer {
     }
 }
 
-/// No layer, no chain.
-const NONE: u16 = u16::MAX;
-
 /// A layer of a row of nodes, in caller's memory.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
@@ -46,76 +43,6 @@ pub struct Point {
     pub at: Layer,
     /// Where space is cubic, what is halfway to the next one of its chain.
     pub middle: Layer,
-}
-
-/// Steps through the nodes of a key's row, from left to right.
-#[derive(Clone, Copy, Debug)]
-struct Walk<'w> {
-    /// Where the layers of the nodes to come end.
-    ends: &'w [u16],
-    labels: &'w [u8],
-    /// The first layer of the node that `seek` has not passed, and where the node's end.
-    next: u16,
-    to: u16,
-}
-
-impl<'w> Walk<'w> {
-    /// Over the `columns` nodes of `key` from node `first` on, before the first of them; over none without a key.
-    fn new(key: Option<&'w Key<'_>>, first: usize, columns: usize) -> Self {
-        let starts = key.and_then(|key| key.start.get(first..=first.wrapping_add(columns))?.split_first());
-        let (to, ends) = starts.map_or((0, &[][..]), |(&at, ends)| (at, ends));
-        Self { ends, labels: key.map_or(&[], |key| &*key.label), next: to, to }
-    }
-
-    /// On to the next node; past the last there is one without layers.
-    #[inline(always)]
-    fn step(&mut self) {
-        self.next = self.to;
-        if let Some((&end, ends)) = self.ends.split_first() {
-            (self.to, self.ends) = (end, ends);
-        }
-    }
-
-    /// The label that `seek` has come to.
-    #[inline(always)]
-    fn label(&self) -> Option<u8> {
-        if self.next < self.to { self.labels.get(usize::from(self.next)).copied() } else { None }
-    }
-
-    /// The index of the node's layer of `label`, or [`NONE`]; labels are asked for in ascending order, as nodes have them.
-    #[inline(always)]
-    fn seek(&mut self, label: u8) -> u16 {
-        while let Some(other) = self.label() {
-            if other >= label {
-                return if other == label { self.next } else { NONE };
-            }
-            self.next = self.next.wrapping_add(1);
-        }
-        NONE
-    }
-
-    /// How many of the next `most` nodes carry a layer of `label` and nothing else, up to the first that does not.
-    #[inline(never)]
-    fn alone(&self, label: u8, most: usize) -> usize {
-        let labels = self.labels.get(usize::from(self.to)..).unwrap_or(&[]);
-        let mut count = 0usize;
-        let mut to = self.to;
-        for (&end, &other) in self.ends.iter().zip(labels).take(most) {
-            to = to.wrapping_add(1);
-            if other != label || end != to {
-                break;
-            }
-            count = count.wrapping_add(1);
-        }
-        count
-    }
-
-    /// Past the next `nodes` nodes, which have a layer each.
-    #[inline(always)]
-    fn jump(&mut self, nodes: usize) {
-        self.ends = self.ends.get(nodes..).unwrap_or(&[]);
-        self.to = self.to.wrapping_add(nodes as u16);
-    }
 }
 
 /// The keys around a moment.
@@ -133,19 +60,6 @@ pub struct Around<'k, 'm> {
     pub key_bits: u32,
 }
 
-impl Around<'_, '_> {
-    /// The fields of a layer, straight between the interval's keys, Q8 pixels.
-    #[inline(always)]
-    fn field(&self, [from, to]: [usize; 2], linear: i32) -> [i16; 2] {
-        let [a, b] = &self.from.fields;
-        let [c, d] = &self.to.fields;
-        let code = |codes: &[i8], index: usize| codes.get(index).copied().unwrap_or(0);
-        let [a, b, c, d] = [code(a, from), code(b, from), code(c, to), code(d, to)];
-        // Most layers are never tested, and have none.
-        if a | b | c | d == 0 { [0; 2] } else { [mix(a, c, linear), mix(b, d, linear)] }
-    }
-}
-
 /// The field between those that two codes stand for, Q8 pixels.
 #[inline(never)]
 fn mix(from: i8, to: i8, linear: i32) -> i16 {
@@ -154,6 +68,15 @@ fn mix(from: i8, to: i8, linear: i32) -> i16 {
     let sum = from.wrapping_mul(ONE.wrapping_sub(linear)).wrapping_add(to.wrapping_mul(linear));
     // The largest distance, 2^15, is one more than 16 bits hold.
     (sum >> WEIGHT_BITS).clamp(-32_767, 32_767) as i16
+}
+
+/// Fills `slots` with what `four` keys' positions make with these `weights`.
+#[inline(never)]
+fn blend_all(slots: &mut [Point], [a, b, c, d]: [&[u32]; 4], weights: Weights, key_bits: u32) {
+    let keys = a.iter().zip(b).zip(c.iter().zip(d));
+    for (slot, ((&a, &b), (&c, &d))) in slots.iter_mut().zip(keys) {
+        slot.at = blend([KeyUv(a), KeyUv(b), KeyUv(c), KeyUv(d)], weights, key_bits);
+    }
 }
 
 /// The sum of `four` positions times `weights`, in Q15.16, rounded to nearest, ties up; exact where one weight is one. Coordinates of
@@ -171,29 +94,51 @@ const fn blend(four: [KeyUv; 4], [a, b, c, d]: Weights, key_bits: u32) -> Layer 
     Layer { u: u.wrapping_shr(drop), v: v.wrapping_shr(drop) }
 }
 
-/// Layers of one label at neighbouring nodes of a row, one at each, which stand side by side in caller's memory.
-#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub struct Chain {
-    /// The first node, and the one after the last.
-    first: u16,
-    end: u16,
-    /// The first layer.
-    at: u16,
-    /// The next chain of the label to the right; [`NONE`]: this is the last.
-    next: u16,
-    label: u16,
-}
-
 impl Chain {
-    /// The first layer and those after it.
+    /// The first layer of a row of nodes and those after it.
     #[inline(always)]
     fn of<'l>(&self, points: &'l [Point]) -> &'l [Point] {
-        points.get(usize::from(self.at)..).and_then(|points| points.get(..self.nodes())).unwrap_or(&[])
+        points.get(usize::from(self.at)..).and_then(|points| points.get(..self.nodes().into())).unwrap_or(&[])
+    }
+}
+
+/// A row's chains, gone through by label and from left to right, beside those of another.
+#[derive(Clone, Copy)]
+struct Beside<'k> {
+    chains: &'k [Chain],
+}
+
+impl<'k> Beside<'k> {
+    fn of(key: Option<&'k Key<'_>>, row: usize) -> Self {
+        Self { chains: key.map_or(&[], |key| key.chains(row)) }
     }
 
-    fn nodes(&self) -> usize {
-        usize::from(self.end.wrapping_sub(self.first))
+    /// The chain of `label` at node `column` or the first to the right of it. Labels, and columns of one label, are asked for in ascending order.
+    #[inline(always)]
+    fn from(&mut self, label: u16, column: u16) -> Option<&'k Chain> {
+        while let Some((chain, rest)) = self.chains.split_first() {
+            if chain.label > label {
+                break;
+            }
+            if chain.label == label && chain.end > column {
+                return Some(chain);
+            }
+            self.chains = rest;
+        }
+        None
+    }
+
+    /// Where in `of` the layers of `label` from node `column` on stand, and the node where that ends: that they do, or that there are none.
+    #[inline(always)]
+    fn part<T>(&mut self, of: &'k [T], label: u16, column: u16) -> (Option<&'k [T]>, u16) {
+        match self.from(label, column) {
+            Some(chain) if chain.first <= column => {
+                let from = usize::from(chain.at.wrapping_add(column.wrapping_sub(chain.first)));
+                (of.get(from..), chain.end)
+            }
+            Some(chain) => (None, chain.first),
+            None => (None, NONE),
+        }
     }
 }
 
@@ -204,7 +149,7 @@ pub struct NodeRow<'m> {
     pub chain: &'m mut [Chain],
     /// How many there are.
     pub chains: usize,
-    /// The first chain of every label, from the left; [`NONE`]: there is none.
+    /// The first chain of every label; [`NONE`]: there is none. The others follow it, from left to right.
     pub head: &'m mut [u16],
     /// Positions, Q15.16 texels, chain by chain.
     pub point: &'m mut [Point],
@@ -214,233 +159,162 @@ pub struct NodeRow<'m> {
     pub field: &'m mut [[i16; 2]],
 }
 
-/// Layers of one label at neighbouring nodes, in caller's memory, one at each, which stand side by side in every key that carries them.
-#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub struct Piece {
-    /// Where in each key that there is; [`NONE`]: nowhere, which only outer keys may say.
-    at: [u16; 4],
-    /// How many.
-    nodes: u16,
-    /// The chain that they are part of.
-    chain: u16,
-}
-
-/// A row of nodes that is being filled, from left to right.
-struct Filling<'f, 'm> {
-    row: &'f mut NodeRow<'m>,
-    pieces: &'f mut [Piece],
-    /// Pieces so far.
-    count: usize,
-    /// Layers that there is room for.
-    room: usize,
-}
-
-impl Filling<'_, '_> {
-    /// Puts layers of `label`, one at each of `nodes` nodes from `column` on.
-    #[inline(always)]
-    fn put(&mut self, label: u8, column: u16, nodes: u16, at: [u16; 4]) {
-        let Some(left) = self.room.checked_sub(nodes.into()) else { return };
-        let Some(last) = self.row.head.get_mut(usize::from(label)) else { return };
-        let Some(piece) = self.pieces.get_mut(self.count) else { return };
-        let end = column.wrapping_add(nodes);
-        match self.row.chain.get_mut(usize::from(*last)) {
-            Some(chain) if chain.end == column => chain.end = end,
-            _ => {
-                let Some(slot) = self.row.chain.get_mut(self.row.chains) else { return };
-                *slot = Chain { first: column, end, at: 0, next: NONE, label: label.into() };
-                *last = self.row.chains as u16;
-                self.row.chains = self.row.chains.wrapping_add(1);
-            }
-        }
-        *piece = Piece { at, nodes, chain: *last };
-        (self.count, self.room) = (self.count.wrapping_add(1), left);
-    }
-
-    /// Finds the layers that both ends of the interval carry in the row of `columns` nodes from node `first` on; returns the pieces.
-    #[inline(never)]
-    fn gather(mut self, keys: &Around<'_, '_>, first: usize, columns: usize) -> usize {
-        let [mut before, mut from, mut to, mut after] =
-            [keys.before, Some(keys.from), Some(keys.to), keys.after].map(|key| Walk::new(key, first, columns));
-        let mut column = 0usize;
-        while column < columns {
-            // Most nodes of most pictures carry one layer, of the same label as the node before.
-            if let Some(&label) = from.labels.get(usize::from(from.to))
-                && from.ends.first() == Some(&from.to.wrapping_add(1))
-            {
-                let mut most = columns.wrapping_sub(column);
-                for (walk, wanted) in [(&from, true), (&to, true), (&before, keys.before.is_some()), (&after, keys.after.is_some())] {
-                    most = if wanted && most > 0 { walk.alone(label, most) } else { most };
-                }
-                if most > 0 {
-                    self.put(label, column as u16, most as u16, [before.to, from.to, to.to, after.to]);
-                    for walk in [&mut before, &mut from, &mut to, &mut after] {
-                        walk.jump(most);
-                    }
-                    column = column.wrapping_add(most);
-                    continue;
-                }
-            }
-            for walk in [&mut before, &mut from, &mut to, &mut after] {
-                walk.step();
-            }
-            while let Some(label) = from.label() {
-                let index = from.next;
-                from.next = from.next.wrapping_add(1);
-                let other = to.seek(label);
-                if other != NONE {
-                    self.put(label, column as u16, 1, [before.seek(label), index, other, after.seek(label)]);
-                }
-            }
-            column = column.wrapping_add(1);
-        }
-        self.count
-    }
-}
-
-impl<'m> NodeRow<'m> {
-    /// Fills the row with the layers that both ends of the interval carry in row `row` of the grid's nodes, weighted; with none
-    /// outside the grid. Returns how many there are. `pieces` is room for as many as there are layers.
-    pub fn fill(&mut self, pieces: &mut [Piece], grid: Grid, row: Option<usize>, keys: &Around<'_, '_>, moment: &Moment) -> u32 {
+impl NodeRow<'_> {
+    fn clear(&mut self) {
         self.head.fill(NONE);
         self.chains = 0;
+    }
+
+    /// Opens a chain of `label` at nodes `first` to `end`, whose layers stand from `at` on; `None` where there is no room.
+    #[inline(always)]
+    fn open(&mut self, label: u16, first: u16, end: u16, at: usize) -> Option<Chain> {
+        let chain = Chain { first, end, at: at as u16, field: NONE, label };
+        let room = at.wrapping_add(chain.nodes().into()) <= self.point.len().min(usize::from(NONE));
+        let slot = self.chain.get_mut(self.chains).filter(|_| room)?;
+        let head = self.head.get_mut(usize::from(label))?;
+        *slot = chain;
+        if *head == NONE {
+            *head = self.chains as u16;
+        }
+        self.chains = self.chains.wrapping_add(1);
+        Some(chain)
+    }
+
+    /// Fills the row with the layers that both ends of the interval carry in row `row` of the grid's nodes, weighted; with none
+    /// outside the grid. Returns how many there are.
+    #[inline(never)]
+    pub fn fill(&mut self, grid: Grid, row: Option<usize>, keys: &Around<'_, '_>, moment: &Moment) -> u32 {
+        self.clear();
         let Some(row) = row.filter(|&row| row < grid.node_rows()) else { return 0 };
-        let columns = grid.node_columns();
-        let room = self.point.len().min(usize::from(NONE));
-        let filling = Filling { row: self, pieces: &mut *pieces, count: 0, room };
-        let count = filling.gather(keys, row.wrapping_mul(columns), columns);
-        let mut at = 0u16;
-        for chain in self.chain.get_mut(..self.chains).unwrap_or(&mut []) {
-            // Until chains are linked, `next` is where the chain's next layer goes.
-            (chain.at, chain.next) = (at, at);
-            at = at.wrapping_add(chain.nodes() as u16);
+        let [mut before, from, mut to, mut after] =
+            [keys.before, Some(keys.from), Some(keys.to), keys.after].map(|key| Beside::of(key, row));
+        let mut count = 0usize;
+        for start in from.chains {
+            let mut column = start.first;
+            while let Some(end) = to.from(start.label, column).filter(|end| end.first < start.end) {
+                let (first, stop) = (column.max(end.first), start.end.min(end.end));
+                let Some(chain) = self.open(start.label, first, stop, count) else { return count as u32 };
+                self.weigh(chain, [start, end], keys, moment, [&mut before, &mut after]);
+                self.distances(chain, [start, end], keys, moment.linear);
+                count = count.wrapping_add(chain.nodes().into());
+                column = stop;
+                if column >= start.end {
+                    break;
+                }
+            }
         }
-        self.weigh(pieces.get(..count).unwrap_or(&[]), keys, moment);
-        self.link();
         self.halve();
-        at.into()
+        count as u32
     }
 
-    /// Works out the layers of `pieces`.
-    #[inline(never)]
-    fn weigh(&mut self, pieces: &[Piece], keys: &Around<'_, '_>, moment: &Moment) {
+    /// Works out the layers of `chain`, which are in both `ends` of the interval; outer keys that lack one weigh nothing.
+    #[inline(always)]
+    fn weigh<'k>(
+        &mut self,
+        chain: Chain,
+        [start, end]: [&Chain; 2],
+        keys: &Around<'k, '_>,
+        moment: &Moment,
+        [before, after]: [&mut Beside<'k>; 2],
+    ) {
         let [both, no_first, no_last, neither] = &moment.weights;
-        let chains = self.chain.get_mut(..self.chains).unwrap_or(&mut []);
-        let [start, end] = [keys.before, keys.after].map(|key| key.map_or(&[][..], |key| &*key.uv));
-        let (from, to) = (&*keys.from.uv, &*keys.to.uv);
-        for piece in pieces {
-            let Some(chain) = chains.get_mut(usize::from(piece.chain)) else { break };
-            let place = usize::from(chain.next);
-            chain.next = chain.next.wrapping_add(piece.nodes);
-            let [mut a, mut b, mut c, mut d] = piece.at.map(usize::from);
-            let weights = match (a < start.len(), d < end.len()) {
-                (true, true) => both,
-                (false, true) => no_first,
-                (true, false) => no_last,
-                (false, false) => neither,
+        let slots = self.point.get_mut(usize::from(chain.at)..).unwrap_or(&mut []);
+        let mut slots = slots.get_mut(..chain.nodes().into()).unwrap_or(&mut []);
+        let layers = |key: &Key<'_>, of: &Chain| usize::from(of.at.wrapping_add(chain.first.wrapping_sub(of.first))).min(key.uv.len());
+        let mut from = keys.from.uv.get(layers(keys.from, start)..).unwrap_or(&[]);
+        let mut to = keys.to.uv.get(layers(keys.to, end)..).unwrap_or(&[]);
+        let mut column = chain.first;
+        while !slots.is_empty() {
+            let (first, high) = before.part(keys.before.map_or(&[], |key| &*key.uv), chain.label, column);
+            let (last, low) = after.part(keys.after.map_or(&[], |key| &*key.uv), chain.label, column);
+            let stop = chain.end.min(high).min(low);
+            let nodes = usize::from(stop.wrapping_sub(column)).min(slots.len());
+            let weights = match (first, last) {
+                (Some(_), Some(_)) => both,
+                (None, Some(_)) => no_first,
+                (Some(_), None) => no_last,
+                (None, None) => neither,
             };
-            for slot in self.point.get_mut(place..).unwrap_or(&mut []).iter_mut().take(usize::from(piece.nodes)) {
-                // An outer key that has none weighs nothing.
-                let [first, last] = [(start, a), (end, d)].map(|(uv, at)| KeyUv(uv.get(at).copied().unwrap_or(0)));
-                let (Some(&leave), Some(&arrive)) = (from.get(b), to.get(c)) else { break };
-                slot.at = blend([first, KeyUv(leave), KeyUv(arrive), last], *weights, keys.key_bits);
-                [a, b, c, d] = [a, b, c, d].map(|at| at.wrapping_add(1));
+            let (some, others) = slots.split_at_mut(nodes);
+            blend_all(some, [first.unwrap_or(from), from, to, last.unwrap_or(to)], *weights, keys.key_bits);
+            (slots, column) = (others, stop);
+            (from, to) = (from.get(nodes..).unwrap_or(&[]), to.get(nodes..).unwrap_or(&[]));
+            // A chain of no nodes, which only a broken bundle has, ends the row.
+            if nodes == 0 {
+                break;
             }
-        }
-        if !self.field.is_empty() {
-            self.distances(pieces, keys, moment.linear);
         }
     }
 
-    /// Works out the fields of `pieces`.
-    #[inline(never)]
-    fn distances(&mut self, pieces: &[Piece], keys: &Around<'_, '_>, linear: i32) {
-        let chains = self.chain.get_mut(..self.chains).unwrap_or(&mut []);
-        for chain in &mut *chains {
-            chain.next = chain.at;
+    /// Works out the fields of `chain`, which is in both `ends` of the interval: straight between them, Q8 pixels.
+    #[inline(always)]
+    fn distances(&mut self, chain: Chain, ends: [&Chain; 2], keys: &Around<'_, '_>, linear: i32) {
+        let slots = self.field.get_mut(usize::from(chain.at)..).unwrap_or(&mut []);
+        let slots = slots.get_mut(..chain.nodes().into()).unwrap_or(&mut []);
+        // Most chains are never tested, and have none.
+        if ends.iter().all(|end| end.field == NONE) {
+            slots.fill([0; 2]);
+            return;
         }
-        for piece in pieces {
-            let Some(chain) = chains.get_mut(usize::from(piece.chain)) else { break };
-            let place = usize::from(chain.next);
-            chain.next = chain.next.wrapping_add(piece.nodes);
-            let [_, mut from, mut to, _] = piece.at.map(usize::from);
-            for slot in self.field.get_mut(place..).unwrap_or(&mut []).iter_mut().take(usize::from(piece.nodes)) {
-                *slot = keys.field([from, to], linear);
-                (from, to) = (from.wrapping_add(1), to.wrapping_add(1));
-            }
+        let [from, to] = [(keys.from, ends[0]), (keys.to, ends[1])].map(|(key, end)| {
+            let first = usize::from(end.field).wrapping_add(chain.first.wrapping_sub(end.first).into());
+            let [a, b] = &key.fields;
+            [a, b].map(|codes| codes.get(first..).filter(|_| end.field != NONE).unwrap_or(&[]))
+        });
+        let code = |codes: &[i8], index: usize| codes.get(index).copied().unwrap_or(0);
+        for (index, slot) in slots.iter_mut().enumerate() {
+            let ([a, b], [c, d]) = (from, to);
+            let [a, b, c, d] = [code(a, index), code(b, index), code(c, index), code(d, index)];
+            *slot = if a | b | c | d == 0 { [0; 2] } else { [mix(a, c, linear), mix(b, d, linear)] };
         }
     }
 
     /// Fills the row with what lies halfway between rows `from` and `to`, where both carry it; `before` and `after` are the rows
     /// around these. Returns how many layers there are.
     #[inline(never)]
-    pub fn between(&mut self, [before, from, to, after]: [&NodeRow<'_>; 4]) -> u32 {
-        self.head.fill(NONE);
-        self.chains = 0;
+    pub fn between(&mut self, rows: [&NodeRow<'_>; 4]) -> u32 {
+        self.clear();
+        let [mut above, from, mut lower, mut below] = rows.map(NodeRow::chains);
+        let [before, upper, bottom, after] = rows.map(|row| &*row.point);
         let mut count = 0usize;
-        for upper in from.chain.get(..from.chains).unwrap_or(&[]) {
-            let mut next = to.head.get(usize::from(upper.label)).copied().unwrap_or(NONE);
-            while let Some(lower) = to.chain.get(usize::from(next)) {
-                next = lower.next;
-                let (first, end) = (upper.first.max(lower.first), upper.end.min(lower.end));
-                if first >= end {
-                    continue;
-                }
-                let Some(slot) = self.chain.get_mut(self.chains) else { break };
-                *slot = Chain { first, end, at: count as u16, next: NONE, label: upper.label };
-                self.chains = self.chains.wrapping_add(1);
-                let Some(slots) = self.point.get_mut(count..).and_then(|points| points.get_mut(..slot.nodes())) else { break };
+        for start in from.chains {
+            let mut column = start.first;
+            while let Some(end) = lower.from(start.label, column).filter(|end| end.first < start.end) {
+                let (first, stop) = (column.max(end.first), start.end.min(end.end));
+                let Some(chain) = self.open(start.label, first, stop, count) else { return count as u32 };
+                let slots = self.point.get_mut(count..).unwrap_or(&mut []);
+                let mut slots = slots.get_mut(..chain.nodes().into()).unwrap_or(&mut []);
                 count = count.wrapping_add(slots.len());
-                let (mut slots, mut column) = (slots, first);
-                let mut from = cut(upper, from.point, first);
-                let mut to = cut(lower, to.point, first);
+                column = first;
+                let mut here = cut(start, upper, first);
+                let mut there = cut(end, bottom, first);
                 while !slots.is_empty() {
-                    let ((above, high), (below, low)) = (before.part(upper.label, column), after.part(upper.label, column));
-                    let stop = end.min(high).min(low);
-                    let length = usize::from(stop.wrapping_sub(column));
+                    let (high, top) = above.part(before, chain.label, column);
+                    let (low, end) = below.part(after, chain.label, column);
+                    let next = stop.min(top).min(end);
+                    let length = usize::from(next.wrapping_sub(column));
                     let (some, rest) = slots.split_at_mut(slots.len().min(length));
-                    let Some(((here, from_rest), (there, to_rest))) = from.split_at_checked(length).zip(to.split_at_checked(length)) else {
+                    let Some(((a, here_rest), (b, there_rest))) = here.split_at_checked(length).zip(there.split_at_checked(length)) else {
                         break;
                     };
-                    middles(some, here, there, above, below);
-                    (slots, from, to, column) = (rest, from_rest, to_rest, stop);
+                    middles(some, a, b, high, low);
+                    (slots, here, there, column) = (rest, here_rest, there_rest, next);
+                    if length == 0 {
+                        break;
+                    }
+                }
+                column = stop;
+                if column >= start.end {
+                    break;
                 }
             }
         }
-        self.link();
         self.halve();
         count as u32
     }
 
-    /// The layers of `label` from node `column` on, and the node where that ends: that they do, or that there are none. Where there are none,
-    /// the slice is empty.
-    fn part(&self, label: u16, column: u16) -> (&[Point], u16) {
-        let mut next = self.head.get(usize::from(label)).copied().unwrap_or(NONE);
-        while let Some(chain) = self.chain.get(usize::from(next)) {
-            if column < chain.first {
-                return (&[], chain.first);
-            }
-            if column < chain.end {
-                return (cut(chain, self.point, column), chain.end);
-            }
-            next = chain.next;
-        }
-        (&[], u16::MAX)
-    }
-
-    /// Links the chains of each label, from left to right.
-    fn link(&mut self) {
-        let chains = self.chain.get_mut(..self.chains).unwrap_or(&mut []);
-        for chain in &*chains {
-            if let Some(head) = self.head.get_mut(usize::from(chain.label)) {
-                *head = NONE;
-            }
-        }
-        for (index, chain) in chains.iter_mut().enumerate().rev() {
-            if let Some(head) = self.head.get_mut(usize::from(chain.label)) {
-                (chain.next, *head) = (*head, index as u16);
-            }
-        }
+    fn chains(&self) -> Beside<'_> {
+        Beside { chains: self.chain.get(..self.chains).unwrap_or(&[]) }
     }
 
     /// Works out what lies halfway between each layer and the next one of its chain, where that is wanted.
@@ -451,7 +325,7 @@ impl<'m> NodeRow<'m> {
         }
         let mut points = &mut *self.point;
         for chain in self.chain.get(..self.chains).unwrap_or(&[]) {
-            let Some((mine, rest)) = points.split_at_mut_checked(chain.nodes()) else { break };
+            let Some((mine, rest)) = points.split_at_mut_checked(chain.nodes().into()) else { break };
             points = rest;
             // Each point waits for two more.
             let mut mine = mine.iter_mut();
@@ -469,14 +343,16 @@ impl<'m> NodeRow<'m> {
     /// Where the layers of `label` at node `column` and at the one to the right of it stand, and how many of its chain are to the right; `None` where there is none.
     #[must_use]
     pub fn find(&self, label: u8, column: usize) -> Option<[u16; 2]> {
-        let column = column as u16;
-        let mut next = *self.head.get(usize::from(label))?;
-        while let Some(chain) = self.chain.get(usize::from(next)) {
+        let (column, label) = (column as u16, u16::from(label));
+        let head = *self.head.get(usize::from(label))?;
+        for chain in self.chain.get(usize::from(head)..self.chains)? {
+            if chain.label != label {
+                break;
+            }
             if column.wrapping_add(1) < chain.end {
                 let along = column.checked_sub(chain.first)?;
                 return Some([chain.at.wrapping_add(along), chain.end.wrapping_sub(column).wrapping_sub(1)]);
             }
-            next = chain.next;
         }
         None
     }
@@ -502,26 +378,26 @@ fn cut<'l>(chain: &Chain, points: &'l [Point], column: u16) -> &'l [Point] {
     chain.of(points).get(usize::from(column.wrapping_sub(chain.first))..).unwrap_or(&[])
 }
 
-/// Fills `slots` with what lies halfway between `from` and `to`; `before` and `after` are what comes before and after, or empty.
-fn middles(slots: &mut [Point], from: &[Point], to: &[Point], before: &[Point], after: &[Point]) {
+/// Fills `slots` with what lies halfway between `from` and `to`; `before` and `after` are what comes before and after, where there is such.
+fn middles(slots: &mut [Point], from: &[Point], to: &[Point], before: Option<&[Point]>, after: Option<&[Point]>) {
     let inner = slots.iter_mut().zip(from.iter().zip(to));
-    match (before.is_empty(), after.is_empty()) {
-        (false, false) => {
+    match (before, after) {
+        (Some(before), Some(after)) => {
             for ((slot, (from, to)), (before, after)) in inner.zip(before.iter().zip(after)) {
                 slot.at = Layer::middle(Some(before.at), from.at, to.at, Some(after.at));
             }
         }
-        (false, true) => {
+        (Some(before), None) => {
             for ((slot, (from, to)), before) in inner.zip(before) {
                 slot.at = Layer::middle(Some(before.at), from.at, to.at, None);
             }
         }
-        (true, false) => {
+        (None, Some(after)) => {
             for ((slot, (from, to)), after) in inner.zip(after) {
                 slot.at = Layer::middle(None, from.at, to.at, Some(after.at));
             }
         }
-        (true, true) => {
+        (None, None) => {
             for (slot, (from, to)) in inner {
                 slot.at = Layer::middle(None, from.at, to.at, None);
             }

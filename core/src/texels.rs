@@ -35,7 +35,7 @@ pub trait Source {
     /// Whether texels of `kind` are played.
     fn known(kind: TexelKind) -> bool;
 
-    /// A bundle of such over enough `memory`, at no frame yet.
+    /// A bundle of such over enough `memory`, at frame 0.
     fn open<'a>(bundle: &'a Bundle<'a>, memory: &'a mut [u8]) -> Playing<'a>;
 
     /// Draws row `y`.

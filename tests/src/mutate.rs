@@ -232,9 +232,12 @@ fn path(sections: &mut [Own], change: impl for<'a> FnOnce(&mut Path<'a>, &'a mut
 }
 
 fn limit(limits: &mut Limits, which: u8, to: u16) {
-    match which % 7 {
+    match which % 10 {
         0 => limits.key_layers = to,
         1 => limits.row_layers = to,
+        7 => limits.key_chains = to,
+        8 => limits.row_chains = to,
+        9 => limits.key_fields = to,
         2 => limits.list_bytes = to,
         3 => limits.row_sheets = to,
         4 => limits.cell_sheets = (to % 12) as u8,

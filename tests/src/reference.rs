@@ -8,9 +8,9 @@ use cubist_core::coder::{Decoder, Probability};
 use cubist_core::fixed::ONE;
 use cubist_core::format::{MASKED, SPACE_CUBIC, STRIP, TIME_CUBIC, TIME_HOLD, TIME_LINEAR, TexelKind};
 use cubist_core::grid::Grid;
-use cubist_core::key::{Key, Nothing};
+use cubist_core::key::{Chain, Key, Nothing};
 use cubist_core::lists::{self, CHART, FIELD, Lists};
-use cubist_core::nodes::{self, Trace};
+use cubist_core::nodes::{self, Layout, Mark, Trace};
 use cubist_core::plane::View;
 use cubist_core::record::{LISTS, MAX_KEYS, Shape, Stream};
 use cubist_core::timeline;
@@ -113,17 +113,21 @@ impl<'a> Reference<'a> {
         let layers = usize::from(limits.key_layers);
         let mut contexts = [vec![Probability::NEW; lists::CONTEXTS], vec![Probability::NEW; nodes::CONTEXTS]];
         let mut traces = vec![Trace::default(); 2 * usize::from(limits.row_layers)];
+        let mut marks = vec![Mark::default(); usize::from(limits.row_layers)];
+        let mut order = vec![0; usize::from(limits.row_chains)];
         let mut views = vec![View::default(); bundle.planes().len()];
-        let mut key_memory: [_; MAX_KEYS] =
-            std::array::from_fn(|_| (vec![0; grid.nodes() + 1], vec![0; layers], vec![0; layers], [vec![0; layers], vec![0; layers]]));
+        let mut key_memory: [_; MAX_KEYS] = std::array::from_fn(|_| {
+            let chains = vec![Chain::default(); usize::from(limits.key_chains)];
+            (vec![0; grid.node_rows() + 1], chains, vec![0; layers], [0; 2].map(|_| vec![0; usize::from(limits.key_fields)]))
+        });
         let mut list_memory: [_; LISTS] = std::array::from_fn(|_| (vec![0; grid.rows + 1], vec![0; usize::from(limits.list_bytes)]));
         let [list_contexts, key_contexts] = &mut contexts;
         let mut stream = Stream {
             list_contexts,
             key_contexts,
-            traces: &mut traces,
+            layout: Layout { traces: &mut traces, marks: &mut marks, order: &mut order },
             views: &mut views,
-            keys: key_memory.each_mut().map(|(start, label, uv, [a, b])| Key { start, label, uv, fields: [a, b] }),
+            keys: key_memory.each_mut().map(|(rows, chains, uv, [a, b])| Key::new(rows, chains, uv, [a, b])),
             lists: list_memory.each_mut().map(|(rows, data)| Lists::new(rows, data)),
             slots: MAX_KEYS,
             turn: 0,
@@ -409,17 +413,20 @@ fn bilinear([a, b, c, d]: &[[f64; 2]; 4], [x, y]: [f64; 2]) -> [f64; 2] {
 /// The layers of every node of a key.
 fn nodes(key: &Key<'_>, grid: Grid, key_bits: u8) -> Vec<Vec<Layer>> {
     let stored = 1.0 / f64::from(1u32 << key_bits);
-    let layer = |index: usize, label: u8| Layer {
-        label,
-        at: [key.uv(index).u(), key.uv(index).v()].map(|x| f64::from(x) * stored),
-        fields: key.field(index).map(|distance| f64::from(distance) * DISTANCE),
-    };
-    (0..grid.nodes())
-        .map(|node| {
-            let (first, labels) = key.node(node);
-            (first..).zip(labels).map(|(index, &label)| layer(index, label)).collect()
-        })
-        .collect()
+    let mut layers = vec![Vec::new(); grid.nodes()];
+    for row in 0..grid.node_rows() {
+        for chain in key.chains(row) {
+            for along in 0..chain.nodes() {
+                let uv = key.uv(usize::from(chain.at + along));
+                layers[row * grid.node_columns() + usize::from(chain.first + along)].push(Layer {
+                    label: chain.label as u8,
+                    at: [uv.u(), uv.v()].map(|x| f64::from(x) * stored),
+                    fields: key.field(chain, along).map(|distance| f64::from(distance) * DISTANCE),
+                });
+            }
+        }
+    }
+    layers
 }
 
 /// The labels of every cell of an interval and their tests, front to back.

@@ -155,8 +155,9 @@ fn linear_time_holds_fewer_keys_than_cubic_time() {
     let needed = |time| {
         let bytes = bake("pivot", [64, 48], 21, false, time, 4);
         let bundle = Bundle::parse(&bytes).expect("the baker's bytes parse");
-        let (limits, nodes) = (bundle.limits(), 9 * 7);
-        let key = usize::from(limits.key_layers) * (5 + usize::from(limits.fields)) + 2 * (nodes + 1);
+        let (limits, rows) = (bundle.limits(), 7);
+        let fields = usize::from(limits.key_fields) * usize::from(limits.fields);
+        let key = usize::from(limits.key_layers) * 4 + usize::from(limits.key_chains) * 10 + fields + 2 * (rows + 1);
         (bundle.memory_needed(), key, usize::from(limits.list_bytes))
     };
     let ((cubic, key, lists), (linear, ..)) = (needed(TIME_CUBIC), needed(TIME_LINEAR));

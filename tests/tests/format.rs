@@ -131,7 +131,7 @@ impl Dump<'_> {
         for name in ["time ", "space ", "key_bits ", "step_log2 "] {
             self.byte(name);
         }
-        for name in ["key_layers ", "row_layers ", "list_bytes ", "row_sheets "] {
+        for name in ["key_layers ", "row_layers ", "key_chains ", "row_chains ", "key_fields ", "list_bytes ", "row_sheets "] {
             self.varint(name, "");
         }
         self.byte("cell_sheets ");

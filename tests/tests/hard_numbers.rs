@@ -181,8 +181,18 @@ fn records_of_noise_play_what_f64_says() {
         });
         path.records = &records;
         // Room for whatever the noise lists: what is beyond the bounds is left out, and what is told from it is told otherwise.
-        path.limits =
-            Limits { key_layers: 4000, row_layers: 1000, list_bytes: 4000, row_sheets: 200, cell_sheets: 9, fields: 2, ..path.limits };
+        path.limits = Limits {
+            key_layers: 4000,
+            row_layers: 1000,
+            key_chains: 4000,
+            row_chains: 1000,
+            key_fields: 4000,
+            list_bytes: 4000,
+            row_sheets: 200,
+            cell_sheets: 9,
+            fields: 2,
+            ..path.limits
+        };
         let changed = postcard::to_stdvec(&path).expect("a path serialises");
         let changed = tamper::with_section(&bytes, PATH, &changed).expect("it is there");
         let bundle = Bundle::parse(&changed).expect("any records parse");

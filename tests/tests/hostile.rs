@@ -204,17 +204,28 @@ proptest! {
         size in (0u16..80, 0u16..80),
         grid in (1u8..7, 0u8..4, 0u8..6),
         units in (0u8..3, 4u8..9),
-        limits in (any::<[u16; 5]>(), 0u8..14, 0u8..4, 0u32..5),
+        limits in (any::<[u16; 8]>(), 0u8..14, 0u8..4, 0u32..5),
         frames in (0u32..20, any::<bool>()),
     ) {
         survives(&with_path(|path| {
             let (values, cell_sheets, fields, shift) = limits;
-            let [key_layers, row_layers, list_bytes, row_sheets, seek_keys] = values.map(|x| x >> (3 * shift));
+            let [key_layers, row_layers, key_chains, row_chains, key_fields, list_bytes, row_sheets, seek_keys] = values.map(|x| x >> (3 * shift));
             (path.width, path.height) = size;
             (path.cell_log2, path.time, path.step_log2) = grid;
             (path.space, path.key_bits) = units;
             (path.frames, path.looping) = frames;
-            path.limits = Limits { key_layers, row_layers, list_bytes, row_sheets, cell_sheets, fields, seek_keys };
+            path.limits = Limits {
+                key_layers,
+                row_layers,
+                key_chains,
+                row_chains,
+                key_fields,
+                list_bytes,
+                row_sheets,
+                cell_sheets,
+                fields,
+                seek_keys,
+            };
         }));
     }
 
@@ -314,9 +325,12 @@ fn planes_out_of_order_and_cameras_too_few_are_refused() {
 #[test]
 fn limits_that_are_too_low_leave_pixels_out_but_play() {
     let halve = |x: &mut u16| *x /= 2;
-    let changes: [fn(&mut Limits); 8] = [
+    let changes: [fn(&mut Limits); 11] = [
         |limits| limits.key_layers /= 2,
         |limits| limits.row_layers /= 2,
+        |limits| limits.key_chains /= 2,
+        |limits| limits.row_chains /= 2,
+        |limits| limits.key_fields /= 2,
         |limits| limits.list_bytes /= 2,
         |limits| limits.row_sheets /= 2,
         |limits| limits.cell_sheets = 1,

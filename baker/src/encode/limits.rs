@@ -49,9 +49,15 @@ pub(super) fn of(content: &Content<'_>, labels: &[LabelRecord], settings: Coding
     let list_bytes = |lists: &[Vec<u8>]| lists.iter().map(|list| lists::bytes(list.len())).sum();
     let row_sheets = |lists: &[Vec<u8>]| lists.iter().map(Vec::len).sum();
     let (back, ahead) = reach(grid.time);
+    let key_layers = bound("layers in a key", most_layers(nodes), COARSER)?;
+    let row_layers = bound("layers in a row of nodes", most_layers(width), COARSER)?;
     Ok(Limits {
-        key_layers: bound("layers in a key", most_layers(nodes), COARSER)?,
-        row_layers: bound("layers in a row of nodes", most_layers(width), COARSER)?,
+        key_layers,
+        row_layers,
+        // No more of them than layers; how many there are turns out as they are coded.
+        key_chains: key_layers,
+        row_chains: row_layers,
+        key_fields: key_layers,
         list_bytes: bound(
             "bytes of sheet lists in a key interval",
             sheets.lists.chunks(cells).map(list_bytes).max().unwrap_or(0),

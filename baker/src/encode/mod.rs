@@ -15,9 +15,9 @@ use cubist_core::format::{
     ATLAS, Atlas, Envelope, FIXED, INFO, KeyEntry, LABELS, LabelRecord, Limits, MAGIC, MASK, MASKED, PACKED, PATH, Path, RAW, STRIP,
     Section, TexelKind, VERSION,
 };
-use cubist_core::key::{Key, Source};
+use cubist_core::key::{Chain, Key, Source};
 use cubist_core::lists::{self, Lists};
-use cubist_core::nodes::{self, Trace};
+use cubist_core::nodes::{self, Layout, Mark, Trace};
 use cubist_core::plane::{CAMERA_BYTES, Camera, PLANE_BYTES, Plane, View};
 use cubist_core::record::{LISTS, MAX_KEYS, Place, Shape, Stream};
 pub use limits::Exceeded;
@@ -79,10 +79,10 @@ pub fn bundle(content: &Content<'_>, settings: CodingSettings, header: Header<'_
     for (record, &thin) in labels.iter_mut().zip(&content.fields.thin) {
         record.flags |= if thin == Thin::No { 0 } else { STRIP };
     }
-    let bounds = limits::of(content, &labels, settings)?;
+    let mut bounds = limits::of(content, &labels, settings)?;
     let planes: Vec<[u8; PLANE_BYTES]> = content.planes.iter().map(Plane::to_bytes).collect();
     let cameras: Vec<[u8; CAMERA_BYTES]> = content.cameras.iter().map(Camera::to_bytes).collect();
-    let (table, records) = keys(content, &labels, &planes, settings, bounds);
+    let (table, records) = keys(content, &labels, &planes, settings, &mut bounds);
     let path = Path {
         width: grid.size[0] as u16,
         height: grid.size[1] as u16,
@@ -159,16 +159,17 @@ fn label_record(label: &crate::atlas::Label, key_bits: u8) -> LabelRecord {
     record
 }
 
-/// The key table and the records.
+/// The key table and the records; `bounds` are brought down to what the chains take.
 fn keys(
     content: &Content<'_>,
     labels: &[LabelRecord],
     planes: &[[u8; PLANE_BYTES]],
     settings: CodingSettings,
-    bounds: Limits,
+    bounds: &mut Limits,
 ) -> (Vec<u8>, Vec<u8>) {
     let grid = content.grid;
-    let mut memory = Memory::new(grid, bounds, planes.len());
+    let mut memory = Memory::new(grid, *bounds, planes.len());
+    (bounds.key_chains, bounds.row_chains, bounds.key_fields) = (0, 0, 0);
     let mut stream = memory.stream();
     let shape = Shape {
         grid: grid.grid,
@@ -192,19 +193,28 @@ fn keys(
         let mut source = Wanted { content, settings, key: position };
         let mut encoder = Encoder::default();
         stream.code(&mut encoder, shape, place, &mut source);
+        if let Some(key) = stream.key(0) {
+            let chains = (0..grid.grid.node_rows()).map(|row| key.chains(row).len() as u16);
+            bounds.key_chains = bounds.key_chains.max(chains.clone().sum());
+            bounds.row_chains = bounds.row_chains.max(chains.max().unwrap_or(0));
+            let [_, fields] = key.held();
+            bounds.key_fields = bounds.key_fields.max(fields as u16);
+        }
         records.extend(encoder.finish());
         table.extend(KeyEntry { frame, independent: place.independent, end: records.len() as u32 }.to_bytes());
     }
     (table, records)
 }
 
-/// Starts, labels, positions, fields.
-type OneKey = (Vec<u16>, Vec<u8>, Vec<u32>, [Vec<i8>; 2]);
+/// Rows, chains, positions, fields.
+type OneKey = (Vec<u16>, Vec<Chain>, Vec<u32>, [Vec<i8>; 2]);
 
 /// The encoder's copy of the memory that the player decodes into.
 struct Memory {
     contexts: [Vec<Probability>; 2],
     traces: Vec<Trace>,
+    marks: Vec<Mark>,
+    order: Vec<u16>,
     views: Vec<View>,
     keys: [OneKey; MAX_KEYS],
     lists: [(Vec<u16>, Vec<u8>); LISTS],
@@ -216,9 +226,12 @@ impl Memory {
         Self {
             contexts: [vec![Probability::NEW; lists::CONTEXTS], vec![Probability::NEW; nodes::CONTEXTS]],
             traces: vec![Trace::default(); 2 * usize::from(limits.row_layers)],
+            marks: vec![Mark::default(); usize::from(limits.row_layers)],
+            order: vec![0; usize::from(limits.row_chains)],
             views: vec![View::default(); planes],
             keys: std::array::from_fn(|_| {
-                (vec![0; grid.grid.nodes() + 1], vec![0; layers], vec![0; layers], [vec![0; layers], vec![0; layers]])
+                let chains = vec![Chain::default(); usize::from(limits.key_chains)];
+                (vec![0; grid.grid.node_rows() + 1], chains, vec![0; layers], [0; 2].map(|_| vec![0; usize::from(limits.key_fields)]))
             }),
             lists: std::array::from_fn(|_| (vec![0; grid.grid.rows + 1], vec![0; usize::from(limits.list_bytes)])),
         }
@@ -229,9 +242,9 @@ impl Memory {
         Stream {
             list_contexts,
             key_contexts,
-            traces: &mut self.traces,
+            layout: Layout { traces: &mut self.traces, marks: &mut self.marks, order: &mut self.order },
             views: &mut self.views,
-            keys: self.keys.each_mut().map(|(start, label, uv, [a, b])| Key { start, label, uv, fields: [a, b] }),
+            keys: self.keys.each_mut().map(|(rows, chains, uv, [a, b])| Key::new(rows, chains, uv, [a, b])),
             lists: self.lists.each_mut().map(|(rows, data)| Lists::new(rows, data)),
             slots: MAX_KEYS,
             turn: 0,
