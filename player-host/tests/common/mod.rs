@@ -37,7 +37,17 @@ pub fn bundle_of(kind: TexelKind) -> Vec<u8> {
         space: SPACE_CUBIC,
         key_bits: 6,
         step_log2: 0,
-        limits: Limits { key_layers: 2000, row_layers: 400, list_bytes: 2000, row_sheets: 80, cell_sheets: 4, fields: 0, seek_keys: 4 },
+        limits: Limits {
+            key_layers: 2000,
+            row_layers: 400,
+            key_chains: 400,
+            row_chains: 80,
+            list_bytes: 2000,
+            row_sheets: 80,
+            cell_sheets: 4,
+            seek_keys: 4,
+            ..Limits::default()
+        },
         table: &table,
         planes: &[],
         cameras: &[],

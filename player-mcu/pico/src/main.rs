@@ -16,7 +16,7 @@ mod tempo;
 use bytemuck::{cast_slice_mut, try_cast_slice_mut};
 use controls::Controls;
 use core::cell::Cell;
-use cubist_core::{AnyTexels, Bundle, ByteOrder, Frame, Player};
+use cubist_core::{AnyTexels, Bundle, ByteOrder, Frame, MemoryError, Player};
 use embedded_hal::digital::{OutputPin, StatefulOutputPin};
 use embedded_hal::spi::MODE_3;
 use fault::Fault;
@@ -30,7 +30,7 @@ use rp2040_hal::{Sio, Timer, Watchdog, entry, pac};
 use strips::{Sender, Strip};
 use tempo::Tempo;
 
-/// A player's working memory: what 264 KB have left beside the buffers and 16 KB of stack, of which playing takes 6.
+/// A player's working memory: what 264 KB have left beside the buffers and 16 KB of stack, of which playing takes 2.
 const ROOM: usize = 236 << 10;
 /// The widest display there is.
 const WIDEST: usize = 320;
@@ -118,9 +118,35 @@ fn fits<'a>(bundle: Bundle<'a>, screen: (u32, u32)) -> Result<Bundle<'a>, Fault>
     if bundle.memory_needed() > ROOM { Err(Fault::Memory) } else { Ok(bundle) }
 }
 
+/// Puts what there is to play into its place, or the test card and what kept it from being played. A function of its own, and so the next: what
+/// they take of the stack is free again when frames are played.
+#[inline(never)]
+fn find(place: &'static mut Option<Bundle<'static>>, screen: (u32, u32)) -> (Option<&'static Bundle<'static>>, Option<Fault>) {
+    let found = slot::bundle().map_err(Fault::from).and_then(|bundle| fits(bundle, screen));
+    let fault = found.as_ref().err().copied();
+    // The card fits: the emulator shows it with every change.
+    *place = found.or_else(|_| Bundle::parse(CARD)).ok();
+    (place.as_ref(), fault)
+}
+
+/// A player, or why there is none.
+type Made = Result<Player<'static, AnyTexels>, MemoryError>;
+
+/// Makes a player in its place, with its result: moved out of that it would be on the stack twice.
+#[inline(never)]
+fn make(
+    place: &'static mut Option<Made>,
+    bundle: &'static Bundle<'static>,
+    memory: &'static mut [u8],
+) -> Option<&'static mut Player<'static, AnyTexels>> {
+    place.insert(Player::with_texels(bundle, memory)).as_mut().ok()
+}
+
 #[entry]
 fn main() -> ! {
     static mut MEMORY: [u8; ROOM] = [0; ROOM];
+    static mut BUNDLE: Option<Bundle<'static>> = None;
+    static mut PLAYER: Option<Made> = None;
     static mut STRIPS: [[u16; PIXELS]; 2] = [[0; PIXELS]; 2];
 
     // Nothing has taken them, and nothing can be told before there are any.
@@ -142,11 +168,9 @@ fn main() -> ! {
     let (data, reset) = (pins.gpio16.into_push_pull_output(), pins.gpio20.into_push_pull_output());
     let Some(panel) = Panel::new(&bus, data, reset, &mut timer) else { Fault::Display.flash(&mut light, &mut timer) };
 
-    let found = slot::bundle().map_err(Fault::from).and_then(|bundle| fits(bundle, panel.size()));
-    let fault = found.as_ref().err().copied();
-    // The card fits: the emulator shows it with every change.
-    let Ok(bundle) = found.or_else(|_| Bundle::parse(CARD)) else { Fault::Broken.flash(&mut light, &mut timer) };
-    let Ok(mut player) = Player::<AnyTexels>::with_texels(&bundle, MEMORY) else { Fault::Memory.flash(&mut light, &mut timer) };
+    let (bundle, fault) = find(BUNDLE, panel.size());
+    let Some(bundle) = bundle else { Fault::Broken.flash(&mut light, &mut timer) };
+    let Some(player) = make(PLAYER, bundle, MEMORY) else { Fault::Memory.flash(&mut light, &mut timer) };
     player.set_byte_order(ByteOrder::BigEndian);
 
     let [first, second] = STRIPS.each_mut().map(|strip| {
@@ -172,12 +196,12 @@ fn main() -> ! {
         },
     };
     let mut tempo = Tempo::new(bundle.frames());
-    stage.show(&mut player, tempo.frame());
+    stage.show(player, tempo.frame());
     if let Some(fault) = fault {
         fault.flash(&mut light, &mut timer);
     }
     loop {
         tempo.step(controls.mode());
-        stage.show(&mut player, tempo.frame());
+        stage.show(player, tempo.frame());
     }
 }

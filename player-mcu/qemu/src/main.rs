@@ -129,7 +129,8 @@ fn make(
     bundle: &'static Bundle<'static>,
     memory: &'static mut [u8],
 ) -> &'static mut Player<'static> {
-    let Ok(player) = place.insert(Player::new(bundle, memory)) else { fail("too little memory") };
+    *place = Some(Player::new(bundle, memory));
+    let Some(Ok(player)) = place else { fail("too little memory") };
     player
 }
 
