@@ -154,7 +154,7 @@ cases! {
     a_soup: 26.0, 1.4, 14.0;
     a_cut: 25.5, 1.1, 5.0;
     a_standing_camera: 35.5, 0.3, 4.0, nothing_flickers;
-    half_a_turn_between_two_keys: 16.0, 3.0, 70.0;
+    half_a_turn_between_two_keys: 21.5, 0.8, 46.0;
     along_rows_of_texels: 98.0, 0.1, 0.5;
     // The ring is cut into eight pieces, the vault along a slit: no way leads across.
     around_a_ring: 21.5, 2.1, 43.0, cuts_are_not_crossed;

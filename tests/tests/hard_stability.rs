@@ -31,7 +31,7 @@ const SHAKY: [(&str, &str, [f64; 2], &str); 7] = [
     ("edge_on", "camera", [1.0, 2.0], "a card that was seen edge-on shows a side"),
     ("far_from_the_origin", "scene", [0.5, FLIPPED], "pieces of surface are joined otherwise"),
     ("t_junctions", "scene", [0.3, FLIPPED], "likewise"),
-    ("half_a_turn_between_two_keys", "scene", [0.7, 8.0], "what two keys do not both see is extrapolated"),
+    ("half_a_turn_between_two_keys", "scene", [MOST, 1.0], "what two keys do not both see is extrapolated"),
 ];
 
 const FRAMES: u32 = 24;
@@ -137,7 +137,7 @@ fn a_millionth_changes_next_to_nothing() {
 #[test]
 fn a_frame_more_or_less_changes_next_to_nothing() {
     // The last frame is a key: with one frame more every interval but the first few is another, and positions bend between other frames. Rough
-    // land has no moment like another: there it is up to a decibel.
+    // land has no moment like another: on so small a screen and so short a way it is up to a decibel (at its own size and length less than 0.2).
     for (name, most) in [("street", MOST), ("cone-orbit", MOST), ("terrain", 1.0)] {
         let psnr = [FRAMES, FRAMES + 1].map(|frames| {
             // The same way in a frame more or less; and at another rate, which is a number for the device and nothing else.
