@@ -235,10 +235,12 @@ fn a_file_that_may_not_be_read_is_said() {
     assert!(!dir.path().join("out.cubist").exists());
 }
 
+/// Files, the scene among them, arguments, the least PSNR of a frame in dB, the most wrong pixels in percent.
+type Odd<'a> = (Vec<File>, &'a str, &'a [&'a str], f64, f64);
+
 #[test]
 fn what_is_odd_but_right_bakes() {
-    // The least PSNR of a frame, dB, and the most wrong pixels, percent.
-    let cases: Vec<(Vec<File>, &str, &[&str], f64, f64)> = vec![
+    let cases: Vec<Odd<'_>> = vec![
         (
             vec![File("t.png", png(1, 1)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)],
             "b.obj",
