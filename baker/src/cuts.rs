@@ -1,5 +1,6 @@
-//! Cuts: between which frames the camera jumps, so that nothing seen after has to do with what was seen before.
-//! The G-buffer comes in; the frames of the keys go out, with those added that keep interpolation on either side of each cut.
+//! Cuts: between which frames the camera jumps, so that nothing seen after has to do with what was seen before; and turns so quick that two keys
+//! see nothing in common.
+//! The G-buffer comes in; the frames of the keys go out, with those added that keep interpolation on either side of each cut, and within a turn.
 
 use crate::gbuffer::GBuffer;
 use crate::sheets::KeyGrid;
@@ -11,6 +12,8 @@ const FAR: f32 = 32.0;
 const MOST: usize = 60;
 /// from the frame before to the last before it, and after it likewise, at most this.
 const LEAST: usize = 20;
+/// A key that sees more than this share of its pixels on surfaces that the next one sees nothing of, or the other way round, percent, is too far from it.
+const STRANGE: usize = 50;
 
 /// The frames of `grid`'s keys and those that cuts ask for; `None` where there is no cut.
 ///
@@ -23,13 +26,48 @@ pub fn keys(gbuffer: &GBuffer, grid: &KeyGrid) -> Option<Vec<u32>> {
     let calm = |frame: Option<usize>| frame.and_then(|frame| jumps.get(frame)).is_none_or(|&jump| jump <= LEAST);
     let cuts = (0..jumps.len()).filter(|&at| jumps[at] >= MOST && calm(at.checked_sub(1)) && calm(Some(at + 1)));
     let mut keys: Vec<u32> = cuts.map(|at| at as u32).flat_map(|at| at.saturating_sub(1)..=(at + 2).min(last)).collect();
-    if keys.is_empty() {
-        return None;
-    }
+    let cut = keys.clone();
     keys.extend(&grid.keys);
     keys.sort_unstable();
     keys.dedup();
-    Some(keys)
+    let seen: Vec<Vec<usize>> = (0..grid.frames).into_par_iter().map(|frame| seen(gbuffer, grid.size, frame)).collect();
+    let mut at = 0;
+    while let Some(&[from, to]) = keys.get(at..at + 2) {
+        let within = to > from + 1 && !cut.contains(&from) && !cut.contains(&to);
+        if within && strange(&seen[from as usize], &seen[to as usize]) {
+            keys.insert(at + 1, from.midpoint(to));
+        } else {
+            at += 1;
+        }
+    }
+    (keys != grid.keys).then_some(keys)
+}
+
+/// How many pixels of `frame` show each label.
+fn seen(gbuffer: &GBuffer, [width, height]: [usize; 2], frame: u32) -> Vec<usize> {
+    let start = frame as usize * width * height;
+    let mut counts = Vec::new();
+    for &label in &gbuffer.label[start..start + width * height] {
+        let label = usize::from(label);
+        if label >= counts.len() {
+            counts.resize(label + 1, 0);
+        }
+        counts[label] += 1;
+    }
+    counts
+}
+
+/// Whether most of what one of two frames sees of surfaces lies on such as the other sees nothing of: where those would be is for neither to
+/// say, least of all beside or behind the camera.
+fn strange(a: &[usize], b: &[usize]) -> bool {
+    let alone = |a: &[usize], b: &[usize]| {
+        // The background is everywhere.
+        let all: usize = a.iter().skip(1).sum();
+        let gone: usize =
+            a.iter().enumerate().skip(1).filter(|&(label, _)| b.get(label).is_none_or(|&count| count == 0)).map(|of| of.1).sum();
+        100 * gone > STRANGE * all
+    };
+    alone(a, b) || alone(b, a)
 }
 
 /// The share of the pixels, background aside, that see another place in the frame after `frame`, percent. Of all pixels: a fence whose boards
@@ -70,6 +108,20 @@ mod tests {
     fn a_cut_gets_two_keys_on_either_side() {
         assert_eq!(of(|frame| frame as f32 + if frame > 11 { 100.0 } else { 0.0 }), Some(vec![0, 8, 10, 11, 12, 13, 16, 23]));
         assert_eq!(of(|frame| if frame > 0 { 100.0 } else { 0.0 }), Some(vec![0, 1, 2, 8, 16, 23]), "after the first frame");
+    }
+
+    #[test]
+    fn a_turn_gets_keys_until_two_see_something_in_common() {
+        // A pillar every 16 pixels, a label each; the screen of 32 pixels passes `speed` pixels a frame.
+        let keys = |speed: usize| {
+            let (width, height, frames) = (32usize, 24usize, 24usize);
+            let labels = (0..frames * height * width).map(|at| 1 + ((at % width + at / (width * height) * speed) / 16) as u16);
+            let label: Vec<u16> = labels.collect();
+            let gbuffer = GBuffer { width: 32, height: 24, frames: 24, uv: vec![[0.0; 2]; label.len()].into(), label };
+            keys(&gbuffer, &KeyGrid::new(&gbuffer, 3, 8, false, [TIME_CUBIC, SPACE_CUBIC]))
+        };
+        assert_eq!(keys(1), None, "half of the first key's pillars are in the next");
+        assert_eq!(keys(4), Some(vec![0, 4, 8, 12, 16, 19, 23]), "a screen in eight frames: half of it in four");
     }
 
     #[test]

@@ -48,6 +48,39 @@ fn bomb(side: u32) -> Vec<u8> {
     bytes
 }
 
+/// A sound PNG of `width` x `height` black texels, grey, of `depth` bits each, in a few hundred kilobytes: a bomb that goes off.
+fn black(width: u32, height: u32, depth: u8) -> Vec<u8> {
+    let length = u64::from(height) * (1 + (u64::from(width) * u64::from(depth)).div_ceil(8));
+    // One block of fixed codes: a zero, as often as it takes the 258 bytes before again, the rest one by one.
+    let (mut bits, mut count, mut data) = (0u64, 0, vec![0x78, 0x01]);
+    let mut put = |code: u64, length: u32| {
+        bits |= code << count;
+        count += length;
+        while count >= 8 {
+            data.push(bits as u8);
+            (bits, count) = (bits >> 8, count - 8);
+        }
+    };
+    // Codes come with their highest bit first: zero is 0011_0000, a length of 258 1100_0101, a distance of one 00000, the end 000_0000.
+    let (zero, again, end) = (0b0000_1100, 0b1010_0011, 0);
+    put(0b011, 3);
+    put(zero, 8);
+    (0..(length - 1) / 258).for_each(|_| put(again, 13));
+    (0..(length - 1) % 258).for_each(|_| put(zero, 8));
+    put(end, 7);
+    put(0, 7);
+    data.extend((((length % 65_521) << 16) as u32 + 1).to_be_bytes());
+    let mut file = b"\x89PNG\r\n\x1a\n".to_vec();
+    let header = [&width.to_be_bytes()[..], &height.to_be_bytes(), &[depth, 0, 0, 0, 0]].concat();
+    for (kind, data) in [(b"IHDR", &header), (b"IDAT", &data), (b"IEND", &Vec::new())] {
+        file.extend((data.len() as u32).to_be_bytes());
+        let whole = [&kind[..], data].concat();
+        file.extend(&whole);
+        file.extend(crc(&whole).to_be_bytes());
+    }
+    file
+}
+
 /// The CRC-32 of PNG chunks.
 fn crc(bytes: &[u8]) -> u32 {
     !bytes
@@ -112,6 +145,14 @@ fn what_is_wrong_is_said_with_place_and_cure() {
         (vec![text("b.obj", "")], &["b.obj"], vec!["b.obj", "no triangles"]),
         (vec![File("t.png", bomb(60_000)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], &["b.obj"], vec!["t.png"]),
         (vec![File("t.png", bomb(2_000)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], &["b.obj"], vec!["t.png"]),
+        // As large as its sides may be, and really there: two hundred kilobytes for a gigabyte.
+        (
+            vec![File("t.png", black(16_384, 16_384, 1)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)],
+            &["b.obj"],
+            vec!["material \"m\"", "t.png", "too large"],
+        ),
+        (vec![text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], &["b.obj"], vec!["material \"m\"", "t.png", "no such file"]),
+        (vec![text("b.obj", TEXTURED), text("a.mtl", "newmtl m\nmap_Kd .\n")], &["b.obj"], vec!["material \"m\"", "is a directory"]),
         (
             vec![File("t.png", png(100_000, 1)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)],
             &["b.obj"],
@@ -170,37 +211,74 @@ fn what_is_wrong_is_said_with_place_and_cure() {
 
 #[test]
 fn a_file_that_may_not_be_read_is_said() {
-    use std::os::unix::fs::PermissionsExt;
+    use std::os::unix::fs::{MetadataExt, PermissionsExt};
+    use std::os::unix::process::CommandExt;
+    /// Who may do nothing.
+    const NOBODY: u32 = 65_534;
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.obj");
     std::fs::write(&path, TRIANGLE).unwrap();
     std::fs::set_permissions(&path, std::fs::Permissions::from_mode(0o000)).unwrap();
-    // Who may do anything may read it: then it bakes.
-    let readable = std::fs::read(&path).is_ok();
-    let (output, _) = bake(dir.path(), &["a.obj", "--size", "16x12", "--frames", "2"]);
+    // Who may do anything may read it. So it is asked by one who may not, by a program that lies where all may come.
+    let program = dir.path().join("cubist-bake");
+    std::fs::copy(env!("CARGO_BIN_EXE_cubist-bake"), &program).unwrap();
+    std::fs::set_permissions(dir.path(), std::fs::Permissions::from_mode(0o777)).unwrap();
+    let mut command = Command::new(&program);
+    command.current_dir(dir.path()).args(["a.obj", "--size", "16x12", "--frames", "2", "--truth", "none", "-o", "out.cubist"]);
+    if std::fs::metadata(dir.path()).unwrap().uid() == 0 {
+        command.uid(NOBODY).gid(NOBODY);
+    }
+    let output = command.output().unwrap();
     let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(i32::from(!readable)), "{said}");
-    assert!(readable || (said.contains("a.obj") && said.contains("check its permissions")), "{said}");
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("a.obj") && said.contains("check its permissions"), "{said}");
+    assert!(!dir.path().join("out.cubist").exists());
 }
+
+/// Files, the scene among them, arguments, the least PSNR of a frame in dB, the most wrong pixels in percent.
+type Odd<'a> = (Vec<File>, &'a str, &'a [&'a str], f64, f64);
 
 #[test]
 fn what_is_odd_but_right_bakes() {
-    let cases: Vec<(Vec<File>, &str, &[&str])> = vec![
-        (vec![File("t.png", png(1, 1)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], "b.obj", &["--size", "32x24", "--frames", "3"]),
+    let cases: Vec<Odd<'_>> = vec![
+        (
+            vec![File("t.png", png(1, 1)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)],
+            "b.obj",
+            &["--size", "32x24", "--frames", "3"],
+            23.0,
+            3.0,
+        ),
         (
             vec![File("t.png", png(16_384, 1)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)],
             "b.obj",
             &["--size", "32x24", "--frames", "3"],
+            23.0,
+            3.0,
         ),
         (
             vec![File("t.png", png(1, 16_384)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)],
             "b.obj",
             &["--size", "32x24", "--frames", "3"],
+            23.0,
+            3.0,
         ),
-        (vec![], "a.obj", &["--size", "1x1", "--frames", "1"]),
-        (vec![], "a.obj", &["--size", "2000x2000", "--frames", "1"]),
-        (vec![], "a.obj", &["--size", "37x23", "--frames", "5"]),
-        (vec![text("größer als ein Dorf 🏠.obj", TRIANGLE)], "größer als ein Dorf 🏠.obj", &["--size", "32x24", "--frames", "2"]),
+        (
+            vec![File("t.png", black(8_192, 4_096, 1)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)],
+            "b.obj",
+            &["--size", "32x24", "--frames", "3"],
+            23.0,
+            3.0,
+        ),
+        (vec![], "a.obj", &["--size", "1x1", "--frames", "1"], 23.0, 3.0),
+        (vec![], "a.obj", &["--size", "2000x2000", "--frames", "1"], 23.0, 3.0),
+        (vec![], "a.obj", &["--size", "37x23", "--frames", "5"], 23.0, 3.0),
+        (
+            vec![text("größer als ein Dorf 🏠.obj", TRIANGLE)],
+            "größer als ein Dorf 🏠.obj",
+            &["--size", "32x24", "--frames", "2"],
+            23.0,
+            3.0,
+        ),
         (
             vec![
                 text("szene eins.toml", "[scene]\nmodel = \"größer als ein Dorf.obj\"\n[playback]\nsize = [24, 16]\nframes = 2\n"),
@@ -208,22 +286,44 @@ fn what_is_odd_but_right_bakes() {
             ],
             "szene eins.toml",
             &[],
+            23.0,
+            3.0,
         ),
-        (vec![text("a.toml", "[scene]\nmodel = \"a.obj\"\n[camera]\nfov = 170\n[playback]\nsize = [32, 24]\nframes = 3\n")], "a.toml", &[]),
-        (vec![text("a.toml", "[scene]\nmodel = \"a.obj\"\n[camera]\nfov = 1\n[playback]\nsize = [32, 24]\nframes = 3\n")], "a.toml", &[]),
+        // Round in three frames, a third of a circle each: the one in the middle is hardly to be interpolated.
+        (
+            vec![text("a.toml", "[scene]\nmodel = \"a.obj\"\n[camera]\nfov = 170\n[playback]\nsize = [32, 24]\nframes = 3\n")],
+            "a.toml",
+            &[],
+            9.0,
+            8.0,
+        ),
+        (
+            vec![text("a.toml", "[scene]\nmodel = \"a.obj\"\n[camera]\nfov = 1\n[playback]\nsize = [32, 24]\nframes = 3\n")],
+            "a.toml",
+            &[],
+            9.0,
+            8.0,
+        ),
     ];
-    for (files, scene, arguments) in cases {
+    for (files, scene, arguments, psnr, wrong) in cases {
         let dir = tempfile::tempdir().unwrap();
         std::fs::write(dir.path().join("a.obj"), TRIANGLE).unwrap();
         for File(name, content) in files {
             std::fs::write(dir.path().join(name), content).unwrap();
         }
-        let (output, took) = bake(dir.path(), &[&[scene], arguments].concat());
+        let (output, took) = bake(dir.path(), &[&[scene, "--report", "report.json"], arguments].concat());
         let said = String::from_utf8_lossy(&output.stderr);
         assert_eq!(output.status.code(), Some(0), "{scene}, {arguments:?}: {said}");
+        // It is the right picture: against exact rays, and of a triangle that is seen.
+        let report: serde_json::Value = serde_json::from_slice(&std::fs::read(dir.path().join("report.json")).unwrap()).unwrap();
+        let quality = |key: &str| report["quality"][key].as_f64().unwrap();
+        println!("{scene}, {arguments:?}: {} dB, {} % wrong, {took:?}", quality("psnr_min"), quality("wrong_surface_percent"));
+        assert!(quality("psnr_min") >= psnr, "{scene}, {arguments:?}: {}", report["quality"]);
+        assert!(quality("wrong_surface_percent") <= wrong, "{scene}, {arguments:?}: {}", report["quality"]);
         let bytes = std::fs::read(dir.path().join("out.cubist")).unwrap();
         let bundle = cubist_core::Bundle::parse(&bytes).unwrap();
-        assert!(bundle.frames() > 0 && took < Duration::from_secs(20), "{scene}: {took:?}");
+        assert!(bundle.label_count() > 1, "{scene}: the triangle is seen");
+        assert!(took < Duration::from_secs(60), "{scene}: {took:?}");
     }
 }
 

@@ -416,6 +416,17 @@ fn files_beside_the_model_are_found_under_encoded_names() {
     let path = folder.path().join("m.gltf");
     std::fs::write(&path, json.to_string()).unwrap();
     assert_eq!(load(&path, &Overrides::default()).unwrap().triangles.len(), 2);
+    // A folder of models beside one of their data is usual. A path from the root is another machine's.
+    std::fs::create_dir(folder.path().join("models")).unwrap();
+    let (below, absolute) = (folder.path().join("models/m.gltf"), folder.path().join("data é.bin"));
+    for (uri, read) in [("../data%20%C3%A9.bin", true), (absolute.to_str().unwrap(), false)] {
+        json["buffers"][0]["uri"] = json!(uri);
+        std::fs::write(&below, json.to_string()).unwrap();
+        match load(&below, &Overrides::default()) {
+            Ok(scene) => assert!(read && scene.triangles.len() == 2, "{uri}"),
+            Err(e) => assert!(!read && e.to_string().contains("an absolute path is not read"), "{uri}: {e}"),
+        }
+    }
     let e = load(folder.path().join("none.glb").as_path(), &Overrides::default()).err().unwrap().to_string();
     assert!(e.contains("none.glb: no such file"), "{e}");
     std::fs::create_dir(folder.path().join("dir.glb")).unwrap();

@@ -29,8 +29,8 @@ pub fn bundle(name: &str) -> Result<Vec<u8>> {
     scenes::bundle(name, scenes::SIZE, scenes::FRAMES, &Settings::default())
 }
 
-/// Bakes and plays scene `name` at the reduced setting: length and CRC-32 of the bundle, CRC-32 of the pixels of
-/// [`SHOWN`] (RGB565, little-endian, row by row).
+/// Bakes and plays scene `name` at the reduced setting: length of the bundle, CRC-32 of all of it but its own checksum, CRC-32 of the
+/// pixels of [`SHOWN`] (RGB565, little-endian, row by row).
 ///
 /// # Errors
 /// Those of the baker.
@@ -41,10 +41,31 @@ pub fn make(name: &str) -> Result<Value> {
         let pixels: Vec<u8> = play::pixels(player).into_iter().flat_map(u16::to_le_bytes).collect();
         frames.insert(format!("{frame:04}"), hex(&pixels));
     })?;
-    let bundle = json!({ "bytes": bytes.len(), "crc32": hex(&bytes) });
+    let bundle = json!({ "bytes": bytes.len(), "crc32": hex(body(&bytes)) });
     Ok(json!({ "scene": name, "size": scenes::SIZE, "frames": scenes::FRAMES, "bundle": bundle, "frame_crc32": frames }))
+}
+
+/// What tells one bundle from another: a CRC over bytes and the CRC of them is the same number whatever they are.
+fn body(bundle: &[u8]) -> &[u8] {
+    &bundle[..bundle.len().saturating_sub(4)]
 }
 
 fn hex(bytes: &[u8]) -> Value {
     Value::String(format!("{:08x}", checksum(bytes)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tamper::seal;
+
+    #[test]
+    fn sealed_bundles_are_told_apart() {
+        let one = include_bytes!("../../fixtures/format/cone.cubist").to_vec();
+        let mut other = one.clone();
+        other[one.len() / 2] ^= 1;
+        seal(&mut other);
+        assert_eq!(hex(&one), hex(&other), "over its own checksum nothing shows");
+        assert_ne!(hex(body(&one)), hex(body(&other)));
+    }
 }

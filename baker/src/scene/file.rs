@@ -311,7 +311,7 @@ fn background(source: &Source<'_>, file: &File, warnings: &mut Warnings) -> Resu
     let path = beside(source, Path::new(text));
     check_file(source, "scene.background", &path)?;
     let picture = crate::files::read(&path)
-        .and_then(|bytes| picture::texture(&bytes, [Wrap::Clamp; 2]))
+        .and_then(|bytes| picture::texture(&bytes, [Wrap::Clamp; 2], &[]))
         .map_err(|what| SceneError::Model { file: path.clone(), what })?;
     if picture.texels.iter().any(|t| t[3] != 255) {
         warnings.add(format!("{}: the background's transparency is ignored", path.display()));

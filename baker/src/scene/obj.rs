@@ -44,7 +44,7 @@ fn model(text: &str, folder: &Path, fallback: Option<&Path>) -> Result<Model, St
     model.materials.push(Material::default());
     if let Some(path) = fallback {
         if textures.all.is_empty() {
-            let decoded = read_file(path).and_then(|b| picture::texture(&b, [Wrap::Repeat; 2]));
+            let decoded = read_file(path).and_then(|b| picture::texture(&b, [Wrap::Repeat; 2], &[]));
             textures.all.push(decoded.map_err(|e| format!("texture {}: {e}", path.display()))?);
             model.materials.iter_mut().for_each(|m| m.texture = Some(0));
         } else {
@@ -229,7 +229,7 @@ impl Shelf {
             return Ok(i as u32);
         }
         let read = |path: &Path| {
-            let decoded = read_file(path).and_then(|b| picture::texture(&b, [Wrap::Repeat; 2]));
+            let decoded = read_file(path).and_then(|b| picture::texture(&b, [Wrap::Repeat; 2], &self.all));
             decoded.map_err(|e| format!("texture {}: {e}", path.display()))
         };
         let mut texture = read(&key.0)?;

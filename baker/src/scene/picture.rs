@@ -9,29 +9,62 @@ use std::io::Cursor;
 pub(crate) const MAX_SIDE: u32 = 16_384;
 /// No decoded picture may take more memory, bytes.
 pub(crate) const MAX_BYTES: u64 = 512 << 20;
-/// Decodes a PNG, JPEG or GIF (its first picture) within the size limits.
-pub(crate) fn decode(bytes: &[u8]) -> Result<DynamicImage, String> {
-    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
-    if reader.format().is_none() {
-        return Err("not a picture; expected PNG, JPEG or GIF: convert it".to_owned());
+/// No picture may have more texels: a file of a few kilobytes can hold as many as the sides allow, and each takes four bytes as it is, as
+/// many for trials, and more for the means that it is reduced to.
+const MAX_TEXELS: u64 = 1 << 26;
+/// Nor all pictures of a scene together.
+const MAX_IN_ALL: u64 = 2 * MAX_TEXELS;
+
+/// Says that a picture is too large, and what is not.
+fn too_large(texels: u64) -> String {
+    format!(
+        "the picture is too large: at most {MAX_SIDE} texels a side, {texels} in all and {} MB decoded: make it smaller",
+        MAX_BYTES >> 20
+    )
+}
+
+/// A reader of a PNG, JPEG or GIF.
+fn open(bytes: &[u8]) -> Result<ImageReader<Cursor<&[u8]>>, String> {
+    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
+    match reader.format() {
+        Some(_) => Ok(reader),
+        None => Err("not a picture; expected PNG, JPEG or GIF: convert it".to_owned()),
     }
+}
+
+/// What the decoder says, and what to do.
+fn broken(error: image::ImageError, texels: u64) -> String {
+    match error {
+        image::ImageError::Limits(_) => too_large(texels),
+        image::ImageError::Unsupported(e) => format!("{e}; expected PNG, JPEG or GIF: convert it"),
+        e => format!("the picture is broken ({e}): export it again"),
+    }
+}
+
+/// Decodes a PNG, JPEG or GIF (its first picture) of at most `texels` texels, within the limits of sides and bytes.
+pub(crate) fn decode(bytes: &[u8], texels: u64) -> Result<DynamicImage, String> {
+    // As it says of itself, before room is made for it.
+    let (width, height) = open(bytes)?.into_dimensions().map_err(|e| broken(e, texels))?;
+    if u64::from(width) * u64::from(height) > texels {
+        return Err(too_large(texels));
+    }
+    let mut reader = open(bytes)?;
     let mut limits = Limits::default();
     limits.max_image_width = Some(MAX_SIDE);
     limits.max_image_height = Some(MAX_SIDE);
     limits.max_alloc = Some(MAX_BYTES);
     reader.limits(limits);
-    reader.decode().map_err(|e| match e {
-        image::ImageError::Limits(_) => {
-            format!("the picture is too large: at most {MAX_SIDE} texels a side and {} MB decoded: make it smaller", MAX_BYTES >> 20)
-        }
-        image::ImageError::Unsupported(e) => format!("{e}; expected PNG, JPEG or GIF: convert it"),
-        e => format!("the picture is broken ({e}): export it again"),
-    })
+    reader.decode().map_err(|e| broken(e, texels))
 }
 
-/// Decodes a picture into an RGBA8 texture, top row first.
-pub(crate) fn texture(bytes: &[u8], wrap: [Wrap; 2]) -> Result<Texture, String> {
-    let rgba = decode(bytes)?.into_rgba8();
+/// Decodes a picture into an RGBA8 texture, top row first; `beside` are those that the scene has already.
+pub(crate) fn texture(bytes: &[u8], wrap: [Wrap; 2], beside: &[Texture]) -> Result<Texture, String> {
+    let there: u64 = beside.iter().map(|texture| texture.texels.len() as u64).sum();
+    let (width, height) = open(bytes)?.into_dimensions().map_err(|e| broken(e, MAX_TEXELS))?;
+    if there + (u64::from(width) * u64::from(height)).min(MAX_TEXELS) > MAX_IN_ALL {
+        return Err(format!("all pictures together have more than {MAX_IN_ALL} texels: make them smaller"));
+    }
+    let rgba = decode(bytes, MAX_TEXELS)?.into_rgba8();
     let (width, height) = rgba.dimensions();
     if width == 0 || height == 0 {
         return Err("the picture has no texels".to_owned());
@@ -82,13 +115,25 @@ mod tests {
     }
 
     #[test]
+    fn pictures_fill_up_what_there_is_for_all() {
+        let mut png = Cursor::new(Vec::new());
+        DynamicImage::new_luma8(4, 2).write_to(&mut png, image::ImageFormat::Png).unwrap();
+        let png = png.into_inner();
+        assert_eq!(texture(&png, [Wrap::Clamp; 2], &[]).unwrap().texels, [[0, 0, 0, 255]; 8]);
+        let large = Texture { width: 1, height: 1, texels: vec![[0; 4]; MAX_IN_ALL as usize - 8], wrap: [Wrap::Clamp; 2] };
+        assert!(texture(&png, [Wrap::Clamp; 2], std::slice::from_ref(&large)).is_ok());
+        let e = texture(&png, [Wrap::Clamp; 2], &[large, texture(&png, [Wrap::Clamp; 2], &[]).unwrap()]).unwrap_err();
+        assert!(e.contains("all pictures together"), "{e}");
+    }
+
+    #[test]
     fn a_picture_bomb_is_an_error() {
         // A PNG header that promises 60000 x 60000 texels.
         let mut png = b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR".to_vec();
         png.extend([0, 0, 0xea, 0x60, 0, 0, 0xea, 0x60, 8, 6, 0, 0, 0]);
         png.extend(crc(&png[12..29]).to_be_bytes());
         png.extend(b"\0\0\0\0IDAT\x35\xaf\x06\x1e\0\0\0\0IEND\xae\x42\x60\x82");
-        let e = decode(&png).unwrap_err();
+        let e = decode(&png, MAX_TEXELS).unwrap_err();
         assert!(e.contains("too large"), "{e}");
     }
 

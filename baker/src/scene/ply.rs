@@ -175,7 +175,7 @@ fn model(bytes: &[u8], folder: &Path, fallback: Option<&Path>) -> Result<Model, 
     let mut material = Material::default();
     if let Some(path) = texture {
         let decoded = read_file(&path)
-            .and_then(|b| picture::texture(&b, [Wrap::Repeat; 2]))
+            .and_then(|b| picture::texture(&b, [Wrap::Repeat; 2], &[]))
             .map_err(|e| format!("texture {}: {e}", path.display()))?;
         if has(&["u", "s", "texture_u", "tx"]) {
             model.textures.push(decoded);

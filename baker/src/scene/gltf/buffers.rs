@@ -60,7 +60,9 @@ pub(crate) enum Location {
     File(PathBuf),
 }
 
-/// Resolves a URI; only data URIs and relative paths are taken.
+/// Resolves a URI; only data URIs and relative paths are taken. Those may lead up and down again, as in `../textures/wall.png`: models in
+/// folders of their own beside their textures are usual. A path from the root is right on one machine only, and on another leads to what is
+/// none of the model's.
 pub(crate) fn locate(uri: &str, folder: &Path) -> Result<Location, String> {
     if let Some(rest) = uri.strip_prefix("data:") {
         let (kind, data) = rest.split_once(',').ok_or("data URI: no comma before the data")?;
@@ -84,6 +86,10 @@ pub(crate) fn locate(uri: &str, folder: &Path) -> Result<Location, String> {
         ));
     }
     let decoded = percent_decode(uri);
+    let rooted = |path: &[u8]| matches!(path, [b'/' | b'\\', ..] | [_, b':', ..]);
+    if rooted(uri.as_bytes()) || rooted(&decoded) {
+        return Err(format!("URI \"{uri}\": an absolute path is not read; expected one relative to the file: put what it names beside it"));
+    }
     let path = folder.join(String::from_utf8_lossy(&decoded).as_ref());
     // Some exporters do not encode: a file really called "a%20b.bin" is taken as well.
     let plain = folder.join(uri);
@@ -162,6 +168,9 @@ mod tests {
     fn the_network_is_never_asked() {
         for uri in ["http://example.com/a.bin", "https://x/y", "file:///etc/passwd", "ftp://x"] {
             assert!(fetch(uri, Path::new("/nowhere")).unwrap_err().contains("never fetched"), "{uri}");
+        }
+        for uri in ["/etc/passwd", "%2Fetc/passwd", "//server/a.bin", "\\\\server\\a.bin", "C:\\a.bin", "c%3A/a.bin"] {
+            assert!(fetch(uri, Path::new("/nowhere")).unwrap_err().contains("an absolute path is not read"), "{uri}");
         }
         assert!(fetch("data:application/octet-stream;;base64,AA==", Path::new("")).unwrap_err().contains("parameter"));
         assert_eq!(fetch("data:;base64,AAE=", Path::new("")).unwrap(), [0, 1]);

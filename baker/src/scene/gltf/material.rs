@@ -38,7 +38,7 @@ pub(crate) fn load(data: Data<'_>, folder: &Path, fallback: Option<&Path>, model
             model.warnings.add(format!("texture {} is not used: the model's materials name their own", path.display()));
         } else {
             let texture = crate::files::read(path)
-                .and_then(|b| picture::texture(&b, [Wrap::Repeat; 2]))
+                .and_then(|b| picture::texture(&b, [Wrap::Repeat; 2], &[]))
                 .map_err(|e| format!("texture {}: {e}", path.display()))?;
             model.textures.push(texture);
             for (material, mapping) in model.materials.iter_mut().zip(&mut mappings) {
@@ -141,11 +141,7 @@ impl Shelf<'_> {
             (None, Some(view)) => self.data.buffers.view(root, view.value()).map(|v| v.0.to_vec()),
             (None, None) => Err("names neither a uri nor a bufferView: data are missing".to_owned()),
         };
-        let decoded = bytes.and_then(|b| picture::texture(&b, wrap)).map_err(|e| format!("{what}: {e}"))?;
-        let total: u64 = model.textures.iter().map(|t| t.texels.len() as u64 * 4).sum();
-        if total + decoded.texels.len() as u64 * 4 > 4 * picture::MAX_BYTES {
-            return Err(format!("{what}: all textures together take more than {} MB: make them smaller", (4 * picture::MAX_BYTES) >> 20));
-        }
+        let decoded = bytes.and_then(|b| picture::texture(&b, wrap, &model.textures)).map_err(|e| format!("{what}: {e}"))?;
         let at = model.textures.len() as u32;
         model.textures.push(decoded);
         self.known.push((source, wrap, at));

@@ -1,7 +1,7 @@
 //! TIFF heights, striped or tiled, of any number type, with GDAL's nodata.
 //! Bytes come from `grid`; the grid goes back there.
 
-use super::grid::Grid;
+use super::grid::{Grid, MAX_POSTS};
 use crate::scene::error::Warnings;
 use crate::scene::picture::{MAX_BYTES, MAX_SIDE};
 use std::io::Cursor;
@@ -11,6 +11,12 @@ use tiff::tags::Tag;
 /// The tag in which GDAL keeps the value that means "no data", as text.
 const GDAL_NODATA: u16 = 42_113;
 
+/// The first band of `values` as numbers of 64 bits, and how many bands there are: the others would take eight bytes a value too.
+fn first<T: Copy>(values: Vec<T>, posts: usize, number: impl Fn(T) -> f64) -> (Vec<f64>, usize) {
+    let bands = (values.len() / posts).max(1);
+    (values.iter().step_by(bands).take(posts).map(|&value| number(value)).collect(), bands)
+}
+
 /// Reads the first picture of a TIFF; of several bands the first.
 pub(crate) fn read(bytes: &[u8], warnings: &mut Warnings) -> Result<Grid, String> {
     let broken = |e: tiff::TiffError| format!("the TIFF cannot be read ({e}); expected uncompressed, LZW or deflate");
@@ -18,36 +24,33 @@ pub(crate) fn read(bytes: &[u8], warnings: &mut Warnings) -> Result<Grid, String
     limits.decoding_buffer_size = MAX_BYTES as usize;
     let mut decoder = Decoder::new(Cursor::new(bytes)).map_err(broken)?.with_limits(limits);
     let (width, height) = decoder.dimensions().map_err(broken)?;
-    if width == 0 || height == 0 || width > MAX_SIDE || height > MAX_SIDE {
-        return Err(format!("{width} x {height} posts; at most {MAX_SIDE} a side are taken: reduce the grid"));
+    if width == 0 || height == 0 || width > MAX_SIDE || height > MAX_SIDE || u64::from(width) * u64::from(height) > MAX_POSTS {
+        return Err(format!("{width} x {height} posts; at most {MAX_SIDE} a side and {MAX_POSTS} in all are taken: reduce the grid"));
     }
     let nodata = match decoder.find_tag(Tag::Unknown(GDAL_NODATA)).map_err(broken)? {
         Some(value) => value.into_string().ok().and_then(|s| s.trim_matches(['\0', ' ']).parse::<f64>().ok()),
         None => None,
     };
-    let mut values: Vec<f64> = match decoder.read_image().map_err(broken)? {
-        DecodingResult::U8(v) => v.into_iter().map(f64::from).collect(),
-        DecodingResult::U16(v) => v.into_iter().map(f64::from).collect(),
-        DecodingResult::U32(v) => v.into_iter().map(f64::from).collect(),
-        DecodingResult::U64(v) => v.into_iter().map(|x| x as f64).collect(),
-        DecodingResult::I8(v) => v.into_iter().map(f64::from).collect(),
-        DecodingResult::I16(v) => v.into_iter().map(f64::from).collect(),
-        DecodingResult::I32(v) => v.into_iter().map(f64::from).collect(),
-        DecodingResult::I64(v) => v.into_iter().map(|x| x as f64).collect(),
-        DecodingResult::F16(v) => v.into_iter().map(|x| f64::from(x.to_f32())).collect(),
-        DecodingResult::F32(v) => v.into_iter().map(f64::from).collect(),
-        DecodingResult::F64(v) => v,
-    };
     let posts = width as usize * height as usize;
-    let bands = values.len() / posts;
-    if bands == 0 {
+    let (mut values, bands) = match decoder.read_image().map_err(broken)? {
+        DecodingResult::U8(v) => first(v, posts, f64::from),
+        DecodingResult::U16(v) => first(v, posts, f64::from),
+        DecodingResult::U32(v) => first(v, posts, f64::from),
+        DecodingResult::U64(v) => first(v, posts, |x| x as f64),
+        DecodingResult::I8(v) => first(v, posts, f64::from),
+        DecodingResult::I16(v) => first(v, posts, f64::from),
+        DecodingResult::I32(v) => first(v, posts, f64::from),
+        DecodingResult::I64(v) => first(v, posts, |x| x as f64),
+        DecodingResult::F16(v) => first(v, posts, |x| f64::from(x.to_f32())),
+        DecodingResult::F32(v) => first(v, posts, f64::from),
+        DecodingResult::F64(v) => first(v, posts, |x| x),
+    };
+    if values.len() < posts {
         return Err(format!("{} values for {width} x {height} posts: the file is cut short: fetch or export it again", values.len()));
     }
     if bands > 1 {
         warnings.add(format!("the picture of heights has {bands} bands: the first is taken"));
-        values = values.chunks_exact(bands).map(|c| c[0]).collect();
     }
-    values.truncate(posts);
     // The text may carry more digits than the stored type holds.
     let is_hole = |v: f64| !v.is_finite() || nodata.is_some_and(|n| v == n || v == f64::from(n as f32));
     let mut holes = 0usize;

@@ -84,11 +84,14 @@ fn centre(i: u32, n: u32, original: u32) -> f64 {
     (f64::from(i) * f64::from(original - 1) / f64::from(n - 1) + 0.5) / f64::from(original)
 }
 
+/// No file may have more posts: each takes eight bytes until they are thinned. An elevation model of 10812 posts a side is a usual one.
+pub(super) const MAX_POSTS: u64 = 1 << 27;
+
 /// Reads heights: TIFF of any number, grey PNG of 8 or 16 bits, or the brightness of another picture.
 pub(crate) fn load(path: &Path, warnings: &mut Warnings) -> Result<Grid, String> {
     let bytes = crate::files::read(path)?;
     let tiff = bytes.starts_with(b"II") || bytes.starts_with(b"MM");
-    let grid = if tiff { geotiff::read(&bytes, warnings)? } else { from_picture(picture::decode(&bytes)?, warnings) };
+    let grid = if tiff { geotiff::read(&bytes, warnings)? } else { from_picture(picture::decode(&bytes, MAX_POSTS)?, warnings) };
     if grid.width < 2 || grid.height < 2 {
         return Err(format!("{} x {} posts; expected at least 2 x 2", grid.width, grid.height));
     }

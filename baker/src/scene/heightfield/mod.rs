@@ -55,7 +55,7 @@ pub(crate) fn load(field: &Field<'_>, screen: &Playback, unlit: bool) -> Result<
     let mut material = Material::default();
     let tint = match field.colour {
         Some(path) => {
-            let mut texture = crate::files::read(path).and_then(|b| picture::texture(&b, [Wrap::Clamp; 2])).map_err(error(path))?;
+            let mut texture = crate::files::read(path).and_then(|b| picture::texture(&b, [Wrap::Clamp; 2], &[])).map_err(error(path))?;
             if let Some(small) = picture::reduce(&texture, MAX_COLOUR) {
                 let (w, h) = (small.width, small.height);
                 model.warnings.add(format!("{}: {} x {} texels averaged down to {w} x {h}", path.display(), texture.width, texture.height));
