@@ -5,7 +5,7 @@ use cubist_core::fixed::{KEY_MAX, KEY_MIN, KeyUv, ONE, WEIGHT_BITS, middle};
 use cubist_core::format::{ATLAS, Limits, PATH, Path, TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
 use cubist_core::{Bundle, Frame, Player, Probe, timeline};
 use cubist_tests::random::Random;
-use cubist_tests::reference::{Reference, Weights};
+use cubist_tests::reference::{Reference, Weights, packed};
 use cubist_tests::synthetic::Synthetic;
 use cubist_tests::{play, tamper};
 use rayon::prelude::*;
@@ -197,6 +197,7 @@ fn records_of_noise_play_what_f64_says() {
         let changed = tamper::with_section(&bytes, PATH, &changed).expect("it is there");
         let bundle = Bundle::parse(&changed).expect("any records parse");
         let reference = Reference::new(&bundle);
+        let bound = packed(1 << path.cell_log2, path.space, u32::from(bundle.atlas().width_log2));
         play::visit(&changed, [0, 3, 8, 13, 16], |frame, player| {
             let (probes, reference) = (play::probes(player), reference.frame(frame, Weights::Player));
             for (index, (exact, probe)) in reference.iter().zip(probes).enumerate() {
@@ -204,7 +205,7 @@ fn records_of_noise_play_what_f64_says() {
                 let apart = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs().max((a[1] - b[1]).abs());
                 let off = apart([probe.at.u, probe.at.v].map(|x| f64::from(x) / 65_536.0), exact.at);
                 // A cell that lists nothing which all its corners carry is left out.
-                let good = probe.label != exact.label || probe == Probe::default() || off <= 2.0 * PACKED;
+                let good = probe.label != exact.label || probe == Probe::default() || off <= bound;
                 compared += usize::from(probe.label == exact.label && probe != Probe::default());
                 assert!(good, "round {round}, frame {frame}, pixel {index}: {off} texels apart: {:?}, {exact:?}", probe.at);
                 wide += usize::from(exact.motion > 500.0);
