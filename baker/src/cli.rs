@@ -65,7 +65,7 @@ pub struct Bake {
     /// Side of a cell of the key-ray grid, pixels: 4, 8, 16 or 32 [default: 8; 16 on screens over 640 wide].
     ///
     /// Smaller cells follow outlines better and take more bytes and memory. Where neither this nor --key-interval is given, lattices and foliage get
-    /// cells half as large with keys twice as far apart, if that shows more for the bytes.
+    /// cells half as large with keys twice as far apart, and rough land cells twice as large with keys twice as close, if that shows more for the bytes.
     #[arg(long, value_name = "PX", value_parser = cell)]
     pub cell: Option<u32>,
     /// Frames between keys, 1 to 256 [default: 8].
