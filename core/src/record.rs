@@ -74,7 +74,7 @@ pub struct Place {
 const LIST_ROWS: usize = 4;
 /// The time a slice takes grows with the bytes it reads. It takes as long as for this many bytes more even where the record hardly says
 /// anything: so was it measured, for either kind of slice.
-pub const SLICE_COST: u32 = 56;
+pub const SLICE_COST: u32 = 24;
 
 impl Place {
     /// Slices of a record at this place: a few rows of cells or one row of nodes each, about the same work.
