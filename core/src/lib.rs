@@ -63,7 +63,9 @@
 //! A key's **record** ([`record`]) is told from the one or two keys before it ([`coder`], [`nodes`]), and from where its camera sees the
 //! planes that flat labels lie in ([`plane`]). An *independent* key is told from no other; decoding starts there. Decoded keys live in a ring in the caller's memory: those that the interval needs (for
 //! cubic time the one before it, its two ends and the one after, else its two ends), and the next one, which is decoded while the
-//! interval plays: every frame does its share of it, some **slices**, so that none pays for a whole key. The sheet lists of the
+//! interval plays: every frame does its share of it, some **slices**, so that none pays for a whole key. In a key, and in a row of nodes that is
+//! interpolated, layers of one label at neighbouring nodes are a **chain** ([`key::Chain`]) and stand side by side: what is the same for all of
+//! them is looked up once. The sheet lists of the
 //! intervals that start at them are in another ring. In playback the next key is complete when it is needed, and the one after it takes
 //! the place of the oldest. A seek to any other place decodes from the last independent key before it, unless going on from where
 //! the ring stands takes fewer keys. On a looping path the first key follows the last, so that the ring simply goes on.

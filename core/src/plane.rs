@@ -189,7 +189,7 @@ impl View {
     /// The position at the node in `column` and `row`, stored units; `None` where the plane is behind the eye, or far out.
     #[must_use]
     pub fn at(&self, column: usize, row: usize) -> Option<[i32; 2]> {
-        self.across(column, row).next()
+        self.across(column, row).advance()
     }
 
     /// The positions at the nodes of `row`, from `column` on.
@@ -221,7 +221,7 @@ pub struct Across {
 impl Across {
     /// The position at the next node, stored units; `None` where the plane is behind the eye, or far out.
     #[inline(always)]
-    pub fn next(&mut self) -> Option<[i32; 2]> {
+    pub fn advance(&mut self) -> Option<[i32; 2]> {
         let [u, v, divisor] = self.at;
         for (at, step) in self.at.iter_mut().zip(self.step) {
             *at = at.wrapping_add(step);

@@ -241,7 +241,7 @@ impl<'k> Known<'k> {
         let at = |(line, uv): (&mut Line<'_>, &[u32])| Some(pair(KeyUv(*uv.get(line.layer(column)?)?)));
         let held = self.held.as_mut().and_then(|(line, uv)| at((line, uv)));
         let older = self.older.as_mut().and_then(|(line, uv, ratio)| Some((at((line, uv))?, *ratio)));
-        let flat = self.plane.as_mut().and_then(Across::next);
+        let flat = self.plane.as_mut().and_then(Across::advance);
         Candidates::new(around, held, older, flat)
     }
 }
