@@ -86,7 +86,7 @@ fn whatever_was_shown_before_a_frame_is_that_of_a_fresh_player() {
 fn no_frame_pays_for_a_key() {
     let frames = 48;
     for (name, looping, time) in [("street", true, TIME_CUBIC), ("terrain", true, TIME_LINEAR), ("round-columns", false, TIME_CUBIC)] {
-        let bytes = bake_even(name, [320, 240], frames, looping, time, 8);
+        let bytes = bake_even(name, [240, 176], frames, looping, time, 8);
         let bundle = Bundle::parse(&bytes).expect("the baker's bytes parse");
         let (ahead, keys) = (if time == TIME_CUBIC { 3 } else { 2 }, bundle.key_count());
         let works = works(&bytes, 0..if looping { 2 * frames } else { frames });
