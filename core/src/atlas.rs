@@ -4,7 +4,7 @@
 use crate::fixed::{PLAY_BITS, PlayUv};
 
 /// The colour plane and the mask.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Texture<'a> {
     /// Texels of the bundle's [`crate::format::TexelKind`], row by row.
     pub texels: &'a [u8],

@@ -17,7 +17,7 @@ use crate::sheet::{RowSheets, Sheet, Stretch};
 use bytemuck::Pod;
 
 /// The caller's memory, cut up.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Workspace<'m> {
     /// The source image: the bundle's own, or unpacked.
     pub texture: Texture<'m>,
@@ -97,9 +97,9 @@ fn picture<'m>(
     Texture { texels, mask, ..texture }
 }
 
-// Inlined where it is only asked how much it takes: then nothing of what it returns is left, which is large.
-#[inline(always)]
-fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, texture: Texture<'m>) -> Workspace<'m> {
+/// Cuts a workspace, or only counts what it would take.
+#[inline(never)]
+fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, space: &mut Workspace<'m>) {
     let (grid, limits) = (bundle.grid(), bundle.limits());
     let (key_layers, row_layers) = (usize::from(limits.key_layers), usize::from(limits.row_layers));
     let (back, ahead) = format::reach(bundle.path().time);
@@ -111,77 +111,52 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, texture: Texture<'m>) -
     let block_log2 = grid.log2.saturating_sub(cubic.into());
     let blocks = grid.columns.saturating_mul(if cubic { 2 } else { 1 });
     let tiles = grid.columns.checked_shl(grid.log2.saturating_sub(block_log2.min(TILE_LOG2))).unwrap_or(0);
-    let row_sheets = usize::from(limits.row_sheets);
     let row_chains = usize::from(limits.row_chains);
-    // A row at one moment has its chains cut where either end of the interval ends one; halfway, where either row does.
-    let node_row = |cutter: &mut Cutter<'m>, wanted: bool, cuts: usize, fields: bool| {
-        let if_wanted = |count: usize| if wanted { count } else { 0 };
-        let chains = row_chains.saturating_mul(cuts).min(row_layers);
-        NodeRow {
-            chain: cutter.take::<Chain>(if_wanted(chains)),
-            chains: 0,
-            head: cutter.take(if_wanted(bundle.label_count())),
-            point: cutter.take::<Point>(if_wanted(row_layers)),
-            cubic,
-            field: cutter.take::<[i16; 2]>(if fields { if_wanted(row_layers) } else { 0 }),
-        }
-    };
-    // What does not change from frame to frame is made ready here, before what is returned takes room on the stack.
-    let (palette, charts) = (cutter.take(bundle.texel_kind().colours()), cutter.take(bundle.label_count()));
-    colours(palette, bundle, false);
-    for (label, chart) in (0..=u8::MAX).zip(charts.iter_mut()) {
+    (space.palette, space.charts) = (cutter.take(bundle.texel_kind().colours()), cutter.take(bundle.label_count()));
+    colours(space.palette, bundle, false);
+    for (label, chart) in (0..=u8::MAX).zip(space.charts.iter_mut()) {
         *chart = Chart::new(&bundle.label(label));
     }
-    Workspace {
-        texture,
-        palette,
-        charts,
-        stream: Stream {
-            list_contexts: cutter.take(lists::CONTEXTS),
-            key_contexts: cutter.take(nodes::CONTEXTS),
-            layout: Layout {
-                traces: cutter.take(row_layers.saturating_mul(2)),
-                marks: cutter.take(row_layers),
-                order: cutter.take(row_chains),
-            },
-            views: cutter.take(bundle.planes().len()),
-            keys: core::array::from_fn(|slot| match slot < slots {
-                true => Key::new(
-                    cutter.take(one_more(grid.node_rows())),
-                    cutter.take(limits.key_chains.into()),
-                    cutter.take(key_layers),
-                    core::array::from_fn(|which| cutter.take(if which < fields { limits.key_fields.into() } else { 0 })),
-                ),
-                false => Key::default(),
-            }),
-            slots,
-            turn: 0,
-            lists: core::array::from_fn(|slot| match slot < slots {
-                true => {
-                    let (rows, data) = (cutter.take(one_more(grid.rows)), cutter.take(usize::from(limits.list_bytes)));
-                    Lists::new(rows, data).at_most(limits.cell_sheets)
-                }
-                false => Lists::default(),
-            }),
-        },
-        rows: core::array::from_fn(|row| node_row(cutter, cubic || row == 1 || row == 2, 2, fields > 0)),
-        halfway: node_row(cutter, cubic, 4, false),
-        sheets: RowSheets { stretch: cutter.take::<Stretch>(grid.columns), stretches: 0, sheet: cutter.take::<Sheet>(row_sheets) },
-        plan: Plan {
-            tile: cutter.take::<Tile>(tiles),
-            run: cutter.take::<Run>(tiles),
-            mixed: cutter.take::<Mixed>(blocks),
-            tiles: 0,
-            runs: 0,
-            mixes: 0,
-            strip: None,
-            reach: 0,
-            row: 0,
-            smooth: 0,
-            torn: 0,
-            tests: 0,
-        },
+    let stream = &mut space.stream;
+    (stream.list_contexts, stream.key_contexts) = (cutter.take(lists::CONTEXTS), cutter.take(nodes::CONTEXTS));
+    stream.layout = Layout {
+        traces: cutter.take(row_layers.saturating_mul(2)),
+        marks: cutter.take(row_layers),
+        order: cutter.take(row_chains),
+    };
+    stream.views = cutter.take(bundle.planes().len());
+    for key in stream.keys.iter_mut().take(slots) {
+        *key = Key::new(
+            cutter.take(one_more(grid.node_rows())),
+            cutter.take(limits.key_chains.into()),
+            cutter.take(key_layers),
+            core::array::from_fn(|which| cutter.take(if which < fields { limits.key_fields.into() } else { 0 })),
+        );
     }
+    for lists in stream.lists.iter_mut().take(slots) {
+        let (rows, data) = (cutter.take(one_more(grid.rows)), cutter.take(usize::from(limits.list_bytes)));
+        *lists = Lists::new(rows, data).at_most(limits.cell_sheets);
+    }
+    stream.slots = slots;
+    // A row at one moment has its chains cut where either end of the interval ends one; halfway, where either row does.
+    let mut node_row = |row: &mut NodeRow<'m>, cuts: usize, fields: bool| {
+        row.chain = cutter.take::<Chain>(row_chains.saturating_mul(cuts).min(row_layers));
+        row.head = cutter.take(bundle.label_count());
+        row.point = cutter.take::<Point>(row_layers);
+        row.field = cutter.take::<[i16; 2]>(if fields { row_layers } else { 0 });
+        row.cubic = cubic;
+    };
+    for (place, row) in space.rows.iter_mut().enumerate() {
+        if cubic || place == 1 || place == 2 {
+            node_row(row, 2, fields > 0);
+        }
+    }
+    if cubic {
+        node_row(&mut space.halfway, 4, false);
+    }
+    (space.sheets.stretch, space.sheets.sheet) = (cutter.take::<Stretch>(grid.columns), cutter.take::<Sheet>(limits.row_sheets.into()));
+    let plan = &mut space.plan;
+    (plan.tile, plan.run, plan.mixed) = (cutter.take::<Tile>(tiles), cutter.take::<Run>(tiles), cutter.take::<Mixed>(blocks));
 }
 
 impl Bundle<'_> {
@@ -190,8 +165,8 @@ impl Bundle<'_> {
     #[inline(never)]
     pub fn memory_needed(&self) -> usize {
         let mut counter = Cutter::new(&mut []);
-        let texture = picture(self, &mut counter, |_, _, _| {});
-        let _ = cut(self, &mut counter, texture);
+        picture(self, &mut counter, |_, _, _| {});
+        cut(self, &mut counter, &mut Workspace::default());
         counter.needed().saturating_mul(4).saturating_add(3)
     }
 }
@@ -207,15 +182,17 @@ pub fn colours(palette: &mut [u16], bundle: &Bundle<'_>, swapped: bool) {
     }
 }
 
-/// `memory` cut up for `bundle`, whose source image `unpack` unpacks if it is packed, slices of nothing where it is too small.
+/// Cuts `memory` up for `bundle`, whose source image `unpack` unpacks if it is packed, into slices of nothing where it is too small.
+// In place: returned, it would be on the stack twice.
 #[inline(never)]
-pub fn workspace<'m>(
+pub fn cut_up<'m>(
     bundle: &Bundle<'m>,
     memory: &'m mut [u8],
+    space: &mut Workspace<'m>,
     unpack: impl Fn(&mut Decoder<'_>, Scratch<'_>, &mut Picture<'_>),
-) -> Workspace<'m> {
+) {
     let (_, words, _) = bytemuck::pod_align_to_mut::<u8, u32>(memory);
     let mut cutter = Cutter::new(words);
-    let texture = picture(bundle, &mut cutter, unpack);
-    cut(bundle, &mut cutter, texture)
+    space.texture = picture(bundle, &mut cutter, unpack);
+    cut(bundle, &mut cutter, space);
 }

@@ -119,7 +119,7 @@ impl Window {
 const MARGIN: i32 = 1 << 13;
 
 /// A strip's blocks, in caller's memory.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Plan<'m> {
     /// The runs' tiles, from left to right.
     pub tile: &'m mut [Tile],

@@ -35,6 +35,36 @@ impl<'a, T: Texels> Player<'a, T> {
     /// Those of [`Player::new`]; [`MemoryError::Texels`] says what the bundle needs.
     #[inline]
     pub fn with_texels(bundle: &'a Bundle<'a>, memory: &'a mut [u8]) -> Result<Self, MemoryError> {
+        Self::check(bundle, memory)?;
+        let mut player = Self::without_memory(bundle);
+        T::give(&mut player.playing, memory);
+        Ok(player)
+    }
+
+    /// Likewise in a `place` of its own, a static's say. A player takes about a kilobyte, and what a function returns is often on the stack twice:
+    /// here it is there once, and gone before memory is cut up.
+    ///
+    /// # Errors
+    /// Those of [`Player::with_texels`]; `place` stays as it was.
+    #[inline]
+    pub fn put<'p>(place: &'p mut Option<Self>, bundle: &'a Bundle<'a>, memory: &'a mut [u8]) -> Result<&'p mut Self, MemoryError> {
+        Self::check(bundle, memory)?;
+        let player = Self::put_without_memory(place, bundle);
+        T::give(&mut player.playing, memory);
+        Ok(player)
+    }
+
+    #[inline(never)]
+    fn put_without_memory<'p>(place: &'p mut Option<Self>, bundle: &'a Bundle<'a>) -> &'p mut Self {
+        place.insert(Self::without_memory(bundle))
+    }
+
+    #[inline(always)]
+    fn without_memory(bundle: &'a Bundle<'a>) -> Self {
+        Self { playing: Playing::new(bundle), texels: PhantomData }
+    }
+
+    fn check(bundle: &Bundle<'_>, memory: &[u8]) -> Result<(), MemoryError> {
         let (needed, given, kind) = (bundle.memory_needed(), memory.len(), bundle.texel_kind());
         if !T::known(kind) {
             return Err(MemoryError::Texels { needed: kind });
@@ -42,7 +72,7 @@ impl<'a, T: Texels> Player<'a, T> {
         if given < needed {
             return Err(MemoryError::TooSmall { needed, given });
         }
-        Ok(Self { playing: T::open(bundle, memory), texels: PhantomData })
+        Ok(())
     }
 
     /// The bundle that plays.

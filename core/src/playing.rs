@@ -110,22 +110,28 @@ pub struct Look<'t> {
 }
 
 impl<'a> Playing<'a> {
-    /// At frame 0, of which nothing is decoded before it is drawn, over at least [`Bundle::memory_needed`] bytes of `memory`; `unpack` unpacks a
-    /// packed source image.
-    // What this returns is large: no copy of it may be left on the callers' stack.
-    #[inline(never)]
-    pub fn new(bundle: &'a Bundle<'a>, memory: &'a mut [u8], unpack: impl Fn(&mut Decoder<'_>, Scratch<'_>, &mut Picture<'_>)) -> Self {
+    /// At frame 0, of which nothing is decoded before it is drawn; it has no memory before [`Playing::give`].
+    // In two steps because this is large: returned by what cuts memory up, it would be on the stack twice.
+    #[inline(always)]
+    pub fn new(bundle: &'a Bundle<'a>) -> Self {
         Self {
             bundle,
-            space: memory::workspace(bundle, memory, unpack),
+            space: Workspace::default(),
             frame: Frame(0),
-            moment: bundle.moment(0),
+            moment: Moment::default(),
             last: None,
             coming: None,
             loaded: None,
             work: Work::default(),
             swapped: false,
         }
+    }
+
+    /// Plays over `memory`, at least [`Bundle::memory_needed`] bytes; `unpack` unpacks a packed source image.
+    #[inline(never)]
+    pub fn give(&mut self, memory: &'a mut [u8], unpack: impl Fn(&mut Decoder<'_>, Scratch<'_>, &mut Picture<'_>)) {
+        self.moment = self.bundle.moment(0);
+        memory::cut_up(self.bundle, memory, &mut self.space, unpack);
     }
 
     /// The bundle that plays.

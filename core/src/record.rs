@@ -16,7 +16,7 @@ pub const MAX_KEYS: usize = 5;
 pub const LISTS: usize = 4;
 
 /// Everything records are coded with and into.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Stream<'m> {
     /// [`lists::CONTEXTS`] of them.
     pub list_contexts: &'m mut [Probability],

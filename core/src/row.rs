@@ -143,7 +143,7 @@ impl<'k> Beside<'k> {
 }
 
 /// One row of nodes at one moment, in caller's memory: label by label, in chains.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct NodeRow<'m> {
     /// The chains.
     pub chain: &'m mut [Chain],

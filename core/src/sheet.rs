@@ -57,7 +57,7 @@ pub struct Stretch {
 }
 
 /// The sheets of a row of cells, in caller's memory.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct RowSheets<'m> {
     /// The cells, from left to right: as much room as there are cells.
     pub stretch: &'m mut [Stretch],

@@ -12,7 +12,6 @@
 //! }
 //! ```
 
-use crate::Bundle;
 use crate::atlas::Texture;
 use crate::coder::Decoder;
 use crate::draw::Paint;
@@ -35,8 +34,8 @@ pub trait Source {
     /// Whether texels of `kind` are played.
     fn known(kind: TexelKind) -> bool;
 
-    /// A bundle of such over enough `memory`, at frame 0.
-    fn open<'a>(bundle: &'a Bundle<'a>, memory: &'a mut [u8]) -> Playing<'a>;
+    /// Plays a bundle of such over `memory`, of which there is enough.
+    fn give<'a>(playing: &mut Playing<'a>, memory: &'a mut [u8]);
 
     /// Draws row `y`.
     fn row(playing: &mut Playing<'_>, y: u32, out: &mut [u16]);
@@ -95,9 +94,9 @@ macro_rules! sources {
                 <$kind>::plays(kind)
             }
 
-            fn open<'a>(bundle: &'a Bundle<'a>, memory: &'a mut [u8]) -> Playing<'a> {
-                let kind = bundle.texel_kind();
-                Playing::new(bundle, memory, |bits, scratch, picture| <$kind>::unpack(kind, bits, scratch, picture))
+            fn give<'a>(playing: &mut Playing<'a>, memory: &'a mut [u8]) {
+                let kind = playing.bundle().texel_kind();
+                playing.give(memory, |bits, scratch, picture| <$kind>::unpack(kind, bits, scratch, picture));
             }
 
             fn row(playing: &mut Playing<'_>, y: u32, out: &mut [u16]) {

@@ -13,7 +13,7 @@ pub type Weights = [i32; 4];
 pub type WeightSet = [Weights; 4];
 
 /// A moment between two keys.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct Moment {
     /// The key interval; key `interval` is at or before the frame.
     pub interval: usize,

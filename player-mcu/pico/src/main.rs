@@ -16,7 +16,7 @@ mod tempo;
 use bytemuck::{cast_slice_mut, try_cast_slice_mut};
 use controls::Controls;
 use core::cell::Cell;
-use cubist_core::{AnyTexels, Bundle, ByteOrder, Frame, MemoryError, Player};
+use cubist_core::{AnyTexels, Bundle, ByteOrder, Frame, Player};
 use embedded_hal::digital::{OutputPin, StatefulOutputPin};
 use embedded_hal::spi::MODE_3;
 use fault::Fault;
@@ -129,24 +129,21 @@ fn find(place: &'static mut Option<Bundle<'static>>, screen: (u32, u32)) -> (Opt
     (place.as_ref(), fault)
 }
 
-/// A player, or why there is none.
-type Made = Result<Player<'static, AnyTexels>, MemoryError>;
-
-/// Makes a player in its place, with its result: moved out of that it would be on the stack twice.
+/// Makes a player in its place.
 #[inline(never)]
 fn make(
-    place: &'static mut Option<Made>,
+    place: &'static mut Option<Player<'static, AnyTexels>>,
     bundle: &'static Bundle<'static>,
     memory: &'static mut [u8],
 ) -> Option<&'static mut Player<'static, AnyTexels>> {
-    place.insert(Player::with_texels(bundle, memory)).as_mut().ok()
+    Player::put(place, bundle, memory).ok()
 }
 
 #[entry]
 fn main() -> ! {
     static mut MEMORY: [u8; ROOM] = [0; ROOM];
     static mut BUNDLE: Option<Bundle<'static>> = None;
-    static mut PLAYER: Option<Made> = None;
+    static mut PLAYER: Option<Player<'static, AnyTexels>> = None;
     static mut STRIPS: [[u16; PIXELS]; 2] = [[0; PIXELS]; 2];
 
     // Nothing has taken them, and nothing can be told before there are any.

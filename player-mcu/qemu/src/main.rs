@@ -16,7 +16,7 @@ use cortex_m::peripheral::Peripherals;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::debug::{self, EXIT_FAILURE};
 use cubist_core::format::SPACE_CUBIC;
-use cubist_core::{Bundle, Frame, MemoryError, Player, Work};
+use cubist_core::{Bundle, Frame, Player, Work};
 use text::Line;
 
 /// Room for a player's working memory; what is not asked for stays untouched.
@@ -122,15 +122,14 @@ fn parse(place: &'static mut Option<Bundle<'static>>) -> &'static Bundle<'static
     place.insert(bundle)
 }
 
-/// Makes a player in its place, with its result: moved out of that it would be on the stack twice.
+/// Makes a player in its place.
 #[inline(never)]
 fn make(
-    place: &'static mut Option<Result<Player<'static>, MemoryError>>,
+    place: &'static mut Option<Player<'static>>,
     bundle: &'static Bundle<'static>,
     memory: &'static mut [u8],
 ) -> &'static mut Player<'static> {
-    *place = Some(Player::new(bundle, memory));
-    let Some(Ok(player)) = place else { fail("too little memory") };
+    let Ok(player) = Player::put(place, bundle, memory) else { fail("too little memory") };
     player
 }
 
@@ -202,7 +201,7 @@ fn main() -> ! {
     static mut MEMORY: [u8; ROOM] = [0; ROOM];
     static mut ROW: [u16; WIDEST] = [0; WIDEST];
     static mut PARSED: Option<Bundle<'static>> = None;
-    static mut PLAYER: Option<Result<Player<'static>, MemoryError>> = None;
+    static mut PLAYER: Option<Player<'static>> = None;
     let Some(peripherals) = Peripherals::take() else { fail("no peripherals") };
     let mut clock = Clock::start(peripherals.SYST);
     let bundle = parse(PARSED);
