@@ -67,11 +67,11 @@ impl<'d, 'a> Drawing<'d, 'a> {
     #[inline(always)]
     pub fn row<P: Paint>(&mut self, y: u32, out: &mut [P::Pixel], work: &mut Work, paint: &P) {
         let out = self.runs(y, out, work, paint);
-        // Quarters of cells of eight pixels are the rule; with numbers that are known the code is a third shorter to run.
-        if P::OFTEN && (self.site.log2(), self.site.bundle.grid().log2) == (2, 3) {
-            mix::<P, true>(&self.site, self.mixed(), y, out, paint);
-        } else {
-            mix::<P, false>(&self.site, self.mixed(), y, out, paint);
+        // Cells of eight pixels, whole or by quarters, are the rule; with numbers that are known the code is a third shorter to run.
+        match (self.site.log2(), self.site.bundle.grid().log2) {
+            (2, 3) if P::OFTEN => mix::<P, 2>(&self.site, self.mixed(), y, out, paint),
+            (3, 3) if P::OFTEN => mix::<P, 3>(&self.site, self.mixed(), y, out, paint),
+            _ => mix::<P, ANY>(&self.site, self.mixed(), y, out, paint),
         }
     }
 
@@ -120,7 +120,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
             let mut samples = [[P::Pixel::default(); 32]; 4];
             for (samples, beside) in samples.iter_mut().zip([[-1, -1], [1, -1], [-1, 1], [1, 1]]) {
                 if let Some(samples) = samples.get_mut(..pixels.len()) {
-                    block::<P, false>(&self.site, *mixed, y, samples, paint, Some(beside));
+                    block::<P, ANY>(&self.site, *mixed, y, samples, paint, Some(beside));
                 }
             }
             let [a, b, c, d] = &samples;
@@ -171,15 +171,19 @@ fn cut<P: Paint>(paint: &P, run: Run, tiles: &mut [Tile], out: &mut [P::Pixel], 
     }
 }
 
-/// Mixed blocks pixel by pixel. EIGHT: they are quarters of cells of eight pixels.
+/// No number of pixels in particular, as the logarithm of a block's side.
+const ANY: u32 = u32::MAX;
+
+/// Mixed blocks pixel by pixel. LOG2: they are 2^LOG2 pixels wide, cells of eight or their quarters; or [`ANY`].
 #[inline(never)]
-fn mix<P: Paint, const EIGHT: bool>(site: &Site<'_, '_, '_>, mixed: &[Mixed], y: u32, out: &mut [P::Pixel], paint: &P) {
-    let log2 = if EIGHT { 2 } else { site.log2() };
+fn mix<P: Paint, const LOG2: u32>(site: &Site<'_, '_, '_>, mixed: &[Mixed], y: u32, out: &mut [P::Pixel], paint: &P) {
+    let log2 = if LOG2 == ANY { site.log2() } else { LOG2 };
     for mixed in mixed {
         let Some(pixels) = mixed.pixels(out, log2) else { break };
-        // The most frequent length has loops of its own.
-        match <&mut [P::Pixel; 4]>::try_from(&mut *pixels) {
-            Ok(four) if EIGHT => block::<P, EIGHT>(site, *mixed, y, four, paint, None),
+        // The most frequent lengths have loops of their own.
+        match LOG2 {
+            2 if let Ok(four) = <&mut [P::Pixel; 4]>::try_from(&mut *pixels) => block::<P, LOG2>(site, *mixed, y, four, paint, None),
+            3 if let Ok(eight) = <&mut [P::Pixel; 8]>::try_from(&mut *pixels) => block::<P, LOG2>(site, *mixed, y, eight, paint, None),
             _ => any_block(site, *mixed, y, pixels, paint),
         }
     }
@@ -188,13 +192,13 @@ fn mix<P: Paint, const EIGHT: bool>(site: &Site<'_, '_, '_>, mixed: &[Mixed], y:
 /// A block of any length.
 #[inline(never)]
 fn any_block<P: Paint>(site: &Site<'_, '_, '_>, mixed: Mixed, y: u32, pixels: &mut [P::Pixel], paint: &P) {
-    block::<P, false>(site, mixed, y, pixels, paint, None);
+    block::<P, ANY>(site, mixed, y, pixels, paint, None);
 }
 
 /// One mixed block, front to back: the frontmost sheet that covers a pixel shows; at pixels' centres, or `beside` them, quarters of a
 /// pixel across and down.
 #[inline(always)]
-fn block<P: Paint, const EIGHT: bool>(
+fn block<P: Paint, const LOG2: u32>(
     site: &Site<'_, '_, '_>,
     mixed: Mixed,
     y: u32,
@@ -202,10 +206,14 @@ fn block<P: Paint, const EIGHT: bool>(
     paint: &P,
     beside: Option<[i32; 2]>,
 ) {
-    let (log2, cell) = if EIGHT { (2, 3) } else { (site.log2(), site.bundle.grid().log2) };
+    let (log2, cell) = if LOG2 == ANY { (site.log2(), site.bundle.grid().log2) } else { (LOG2, 3) };
     let row = y & (1u32 << log2).wrapping_sub(1);
     let texture = site.texture;
-    let block = if EIGHT { site.quarter(mixed.block.into(), y >> log2) } else { site.block(mixed.block.into(), y >> log2) };
+    let block = match LOG2 {
+        2 => site.quarter(mixed.block.into(), y >> log2),
+        3 => site.whole(),
+        _ => site.block(mixed.block.into(), y >> log2),
+    };
     let mut left = u32::MAX.wrapping_shr(32u32.wrapping_sub(pixels.len() as u32));
     let mut sheets = mixed.sheets;
     while sheets != 0 && left != 0 {

@@ -190,6 +190,13 @@ impl Site<'_, '_, '_> {
         Block { rows: self.rows, quarter: Some([block & 1 == 1, strip & 1 == 1]) }
     }
 
+    /// The block of any place where space is linear: it is the cell.
+    #[must_use]
+    #[inline(always)]
+    pub const fn whole(&self) -> Block<'_, '_> {
+        Block { rows: self.rows, quarter: None }
+    }
+
     /// What is above and below strip `strip`, from the left corners of `sheet` on: nodes, and halfway to the next.
     fn lines(&self, strip: u32, sheet: &Sheet) -> [&[Layer]; 2] {
         let ([top, halfway, bottom], [a, b, c]) = (self.rows, sheet.nodes());
@@ -208,7 +215,7 @@ impl Site<'_, '_, '_> {
     /// Block `block` of strip `strip`.
     #[must_use]
     pub fn block(&self, block: u32, strip: u32) -> Block<'_, '_> {
-        if self.cubic() { self.quarter(block, strip) } else { Block { rows: self.rows, quarter: None } }
+        if self.cubic() { self.quarter(block, strip) } else { self.whole() }
     }
 }
 
