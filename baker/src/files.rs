@@ -64,6 +64,21 @@ pub fn open_to_read(path: &Path) -> Result<(File, u64), String> {
     Ok((File::open(path).map_err(denied)?, meta.len()))
 }
 
+/// Whether a path leads from a root: such is right on one machine only, and on another leads to what is none of a model's.
+#[must_use]
+pub fn rooted(path: &[u8]) -> bool {
+    matches!(path, [b'/' | b'\\', ..] | [_, b':', ..])
+}
+
+/// The file that a model in `folder` names, with either kind of slash. Of a path from the root, as some programs write, it is the file of that name
+/// beside the model.
+#[must_use]
+pub fn beside(name: &str, folder: &Path) -> PathBuf {
+    let name = if rooted(name.as_bytes()) { name.rsplit(['/', '\\']).next().unwrap_or(name) } else { name };
+    let path = folder.join(name);
+    if path.exists() { path } else { folder.join(name.replace('\\', "/")) }
+}
+
 /// The bytes of a file.
 ///
 /// # Errors

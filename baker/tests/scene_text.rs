@@ -36,6 +36,17 @@ fn obj_with_materials_textures_and_quads() {
 }
 
 #[test]
+fn paths_from_the_root_lead_to_files_beside_the_model() {
+    let obj = format!("mtllib C:\\models\\a.mtl\n{QUAD}usemtl wall\nf 1/1 2/2 3/3\n");
+    let files: [(&str, &[u8]); 3] =
+        [("a.obj", obj.as_bytes()), ("a.mtl", b"newmtl wall\nmap_Kd /home/somebody/wall.png\n"), ("wall.png", &save_png([9, 8, 7]))];
+    let scene = with(&files, "a.obj").unwrap();
+    assert_eq!(scene.textures[0].texels[0], [9, 8, 7, 255]);
+    let error = with(&files[..2], "a.obj").unwrap_err();
+    assert!(error.contains("wall.png") && !error.contains("somebody"), "{error}");
+}
+
+#[test]
 fn obj_without_its_library_is_white_and_says_so() {
     let scene = with(&[("a.obj", format!("mtllib gone.mtl\n{QUAD}usemtl x\nf 1 2 3\nl 1 2\n").as_bytes())], "a.obj").unwrap();
     assert!(scene.warnings.iter().any(|w| w.contains("gone.mtl")), "{:?}", scene.warnings);

@@ -1,5 +1,5 @@
 //! The source image at playback: texels by position, and whether a texel belongs to its chart.
-//! Borrowed from the bundle; read by `span`.
+//! Borrowed from the bundle or unpacked by `pack`; read by `coverage`, `filter` and `texels`.
 
 use crate::fixed::{PLAY_BITS, PlayUv};
 

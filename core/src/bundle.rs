@@ -289,7 +289,7 @@ fn check_path<'a>(path: &Path<'a>) -> Result<&'a [[u8; KEY_BYTES]], BundleError>
         field(most <= u32::from(path.limits.seek_keys), "PATH seek_keys", u32::from(path.limits.seek_keys))?;
     }
     if !path.looping && frame != path.frames.saturating_sub(1) {
-        return Err(BundleError::Key { key: keys.len() as u32 });
+        return Err(BundleError::Key { key: keys.len().saturating_sub(1) as u32 });
     }
     length(end as usize, path.records.len(), "PATH records")?;
     Ok(keys)

@@ -1,5 +1,5 @@
 //! Entropy coding: a binary range coder with adaptive contexts, and how numbers become bits.
-//! Bytes come from a bundle's key records; `lists` and `nodes` describe what is coded, through
+//! Bytes come from a bundle's key records and packed picture; `lists`, `predict`, `field` and `pack` describe what is coded, through
 //! [`Bits`], which the baker's encoder implements too: one description of the stream for both.
 //!
 //! The range decoder is LZMA's (Igor Pavlov): 32-bit range, 12-bit probabilities; how fast they adapt is our own.
@@ -124,7 +124,8 @@ impl Bits for Decoder<'_> {
 
 /// Contexts of one signed number: is it zero, its sign, its magnitude class in unary, the bit after the leading one.
 pub const NUMBER_CONTEXTS: usize = 2 + 2 * CLASSES;
-/// Magnitude classes: 16 bits of magnitude at most.
+/// Magnitude classes: 17 bits of magnitude at most. The last needs no flag that it is, and the first has no bit after the leading one: two contexts of a
+/// number are never used.
 const CLASSES: usize = 17;
 
 /// Codes a signed number of at most 17 bits of magnitude in `contexts` ([`NUMBER_CONTEXTS`] of them): zero flag, sign, the

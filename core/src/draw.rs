@@ -13,7 +13,7 @@ use crate::work::{Probe, Work};
 pub trait Paint {
     /// A pixel.
     type Pixel: Copy + Default;
-    /// Made so often that loops of their own pay.
+    /// Drawn for every frame, so that loops for the usual sizes of blocks are worth their code.
     const OFTEN: bool;
 
     /// How far around a position pixels are told from, Q16 texels.
@@ -117,6 +117,11 @@ impl<'d, 'a> Drawing<'d, 'a> {
         let out = self.runs(y, out, work, paint);
         for mixed in self.mixed() {
             let Some(pixels) = mixed.pixels(out, log2) else { break };
+            // One sheet has no outlines here: it is only that its positions fit no window.
+            if mixed.sheets.is_power_of_two() {
+                any_block(&self.site, *mixed, y, pixels, paint);
+                continue;
+            }
             let mut samples = [[P::Pixel::default(); 32]; 4];
             for (samples, beside) in samples.iter_mut().zip([[-1, -1], [1, -1], [-1, 1], [1, 1]]) {
                 if let Some(samples) = samples.get_mut(..pixels.len()) {

@@ -109,9 +109,7 @@ impl Known<'_> {
     fn told(&mut self, codes: &[i8], column: u16) -> Told {
         let before = column.checked_sub(1);
         let last = self.last.filter(|last| Some(last.column) == before);
-        // A node without a field is passed by: what is north of it may have one.
-        let passed = if last.is_none() { before.and_then(|before| self.north.field(before)) } else { None };
-        let north_west = last.map_or_else(|| known_at(codes, passed), |last| last.north);
+        let north_west = last.and_then(|last| last.north);
         let past = |line: &mut Option<(Line<'_>, &[i8])>| line.as_mut().and_then(|(line, codes)| known_at(codes, line.field(column)));
         Told {
             held: past(&mut self.held),

@@ -1,5 +1,5 @@
 //! Fixed-point numbers: how coordinates are stored in keys, how they are interpolated.
-//! Values come from `key`, weights from `timeline`; results go to `cell` and `span`.
+//! Values come from `key`, weights from `timeline`; results go to `row` and `sheet`.
 //!
 //! A number's unit goes with its place: stored positions count 1/32 to 1/128 texel, as the bundle says, playback's are Q15.16 texels; time weights are Q14;
 //! a field is a code from -37 to 37 where it is stored, Q8 pixels in a key, Q16 pixels during playback.
@@ -55,10 +55,7 @@ pub struct PlayUv {
 /// such: the four-point rule (Dyn, Levin, Gregory 1987), a parabola without one of the outer two, the mean without both.
 /// Exact where all are the same.
 #[must_use]
-#[expect(
-    clippy::arithmetic_side_effects,
-    reason = "values are positions below 2^27.6 in size or fields below 2^24: no sum of four reaches 2^30"
-)]
+#[expect(clippy::arithmetic_side_effects, reason = "values are positions below 2^27.6 in size: no sum of four reaches 2^30")]
 pub const fn middle(before: Option<i32>, from: i32, to: i32, after: Option<i32>) -> i32 {
     let bend = match (before, after) {
         (Some(before), Some(after)) => ((from - before) + (to - after)) >> 3,

@@ -191,7 +191,7 @@ pub struct Setting<'s, 'm, L> {
     pub step_log2: u32,
     /// The key before, unless this one is independent.
     pub before: Option<&'s Key<'m>>,
-    /// The key before that one, and the length of the coming interval over that between the two, Q8.
+    /// The key before that one; and the length of the interval that ends at this key over that of the one before it, Q8.
     pub before_that: Option<(&'s Key<'m>, i32)>,
     /// The sheet lists of the intervals that end and start at this key.
     pub lists: [Option<&'s Lists<'m>>; 2],

@@ -116,17 +116,26 @@ fn lay_out<L>(setting: &Setting<'_, '_, L>, target: &mut Key<'_>, layout: &mut L
     }
 }
 
-/// Sorts chains by label; those of one label stay in order. There are a few, nearly in order.
+/// Sorts chains by label, those of one label from left to right. Mostly there are a few, nearly in order; a broken bundle may have tens of thousands,
+/// which Shell's method (1959), by steps a third as long each time, sorts in some millions of comparisons.
 fn sort(chains: &mut [Chain]) {
-    for end in 1..chains.len() {
-        let mut at = end;
-        while let Some([left, right]) = at.checked_sub(1).and_then(|before| chains.get_mut(before..)?.first_chunk_mut::<2>()) {
-            if left.label <= right.label {
-                break;
+    let mut step = 1usize;
+    while step.wrapping_mul(3) < chains.len() {
+        step = step.wrapping_mul(3).wrapping_add(1);
+    }
+    while step > 0 {
+        for end in step..chains.len() {
+            let mut at = end;
+            while let Some(before) = at.checked_sub(step) {
+                let Some([left, .., right]) = chains.get_mut(before..=at) else { break };
+                if (left.label, left.first) <= (right.label, right.first) {
+                    break;
+                }
+                core::mem::swap(left, right);
+                at = before;
             }
-            core::mem::swap(left, right);
-            at = at.wrapping_sub(1);
         }
+        step /= 3;
     }
 }
 
@@ -283,6 +292,25 @@ fn collect(sheets: SheetsRef<'_>, found: &mut Vec<Found, MAX_NODE_LAYERS>) {
                 }
                 let _ = found.push(moved);
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Chain, sort};
+
+    #[test]
+    fn chains_are_sorted_by_label_and_from_left_to_right() {
+        let mut seed = 5u32;
+        for count in [0usize, 1, 2, 3, 7, 40, 3000] {
+            let mut chains: [Chain; 3000] = core::array::from_fn(|at| {
+                seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+                Chain { first: at as u16, label: (seed >> 24) as u16 % 9, ..Chain::default() }
+            });
+            let chains = chains.get_mut(..count).unwrap_or(&mut []);
+            sort(chains);
+            assert!(chains.is_sorted_by_key(|chain| (chain.label, chain.first)), "{count}");
         }
     }
 }

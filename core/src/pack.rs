@@ -79,7 +79,8 @@ pub fn code_nibbles<B: Bits>(bits: &mut B, scratch: Scratch<'_>, picture: &mut P
     code_plane(bits, contexts, recent, rows, *width_log2, &mut Nibbles { texels, mask });
 }
 
-/// Codes `picture`, of RGB565, like [`code`], but as three planes one after the other: green, and what red and blue are more than half of it.
+/// Codes `picture`, of RGB565, like [`code`], but as three planes one after the other: green; then red and blue, each less half of
+/// green, modulo 32, plus 16.
 pub fn code_direct<B: Bits>(bits: &mut B, scratch: Scratch<'_>, picture: &mut Picture<'_>) {
     let Scratch { contexts, recent, rows } = scratch;
     contexts.fill(Probability::NEW);

@@ -128,7 +128,8 @@ const LIMIT: u32 = 1 << 17;
 /// Division by one number of several whose quotients are small: long divisions are slow on small processors.
 struct Quotient {
     divisor: u64,
-    /// How far everything is shifted down for a guess, and the least number that the divisor is below then, or it itself where that is nothing.
+    /// Everything is shifted right by `shift` for a first guess; `short` is the divisor shifted, and one more if bits were lost, so that the guess is
+    /// never too large.
     shift: u32,
     short: u32,
 }
@@ -144,7 +145,9 @@ impl Quotient {
     /// `numerator` (below 2^63) divided, rounded down; `None` if that is far above [`LIMIT`].
     fn of(&self, numerator: u64) -> Option<u32> {
         // Exact, or below 2^32 / 2^14 and too small by at most a 2^14-th of it and one.
-        let mut quotient = u32::try_from(numerator >> self.shift).ok()?.checked_div(self.short)?;
+        let guess = u32::try_from(numerator >> self.shift).ok()?.checked_div(self.short)?;
+        // Far above, it would not fit what it is taken for.
+        let mut quotient = Some(guess).filter(|&guess| guess <= LIMIT)?;
         let mut rest = numerator.wrapping_sub(u64::from(quotient).wrapping_mul(self.divisor));
         while rest >= self.divisor && quotient <= LIMIT {
             (rest, quotient) = (rest.wrapping_sub(self.divisor), quotient.wrapping_add(1));
@@ -258,6 +261,13 @@ mod tests {
             let numerator = exact * divisor + next(46) % divisor;
             let quotient = Quotient::new(divisor).of(numerator).filter(|&quotient| quotient < LIMIT);
             assert_eq!(quotient.map(u64::from), Some(exact).filter(|&exact| exact < u64::from(LIMIT)), "{numerator} / {divisor}");
+        }
+    }
+
+    #[test]
+    fn quotients_far_above_the_limit_are_none() {
+        for (divisor, numerator) in [(1, u64::from(u32::MAX) - 3), (1, u64::from(LIMIT) + 2), (3, 1 << 33), (1 << 40, 1 << 62)] {
+            assert_eq!(Quotient::new(divisor).of(numerator), None, "{numerator} / {divisor}");
         }
     }
 }

@@ -36,8 +36,8 @@ struct Last {
     key: usize,
     /// Records since the last independent one; 0 for that one itself.
     run: u32,
-    /// Keys decoded one after the other up to this one: as many of them as there are slots are held.
-    chain: usize,
+    /// How many keys were decoded in an unbroken sequence up to this one; as many of them as there are slots are held.
+    sequence: usize,
 }
 
 /// A key that is being decoded.
@@ -167,7 +167,7 @@ impl<'a> Playing<'a> {
         // Either on from the last key, or from the independent key at or before the first one needed.
         let on = self.last.map(|state| (state, self.distance(state.key, last))).filter(|(state, on)| {
             let behind = self.bundle.looping() || state.key <= last;
-            behind && state.chain.saturating_add(*on) >= span
+            behind && state.sequence.saturating_add(*on) >= span
         });
         let back = (0..=first).rev().take_while(|&key| !self.bundle.key(key).independent).count();
         let start = first.saturating_sub(back);
@@ -338,7 +338,7 @@ impl<'a> Playing<'a> {
         let mut coming = self.take_up(key);
         self.decode(&mut coming, 0);
         self.space.stream.finish();
-        self.last = Some(Last { key, run: coming.run, chain: self.last.map_or(0, |last| last.chain).saturating_add(1) });
+        self.last = Some(Last { key, run: coming.run, sequence: self.last.map_or(0, |last| last.sequence).saturating_add(1) });
     }
 
     /// Decodes the key after `last` as far as it is due at the current moment.

@@ -72,8 +72,7 @@ pub struct Place {
 
 /// Rows of cells whose lists make a slice: about as much work as one row of nodes.
 const LIST_ROWS: usize = 4;
-/// The time a slice takes grows with the bytes it reads. It takes as long as for this many bytes more even where the record hardly says
-/// anything: so was it measured, for either kind of slice.
+/// What a slice costs beside the bytes that it reads, in bytes of equal time; measured for both kinds of slice.
 pub const SLICE_COST: u32 = 24;
 
 impl Place {

@@ -1,4 +1,4 @@
-//! What a player says about its work and its pixels. Counted by `player` and `draw`, read by callers.
+//! What a player says about its work and its pixels. Counted by `playing` and `draw`, read by callers.
 
 use crate::fixed::PlayUv;
 

@@ -5,8 +5,8 @@
 //! - a layer in time to nearest: 1 / 2^17;
 //! - the left and the right end of a span downwards: 1 / 2^16;
 //! - the step along it to nearest: (cell - 1) / 2^17 at its last pixel.
-//! - where one sheet shows, positions are packed for every four pixels, to the nearest of 512 steps a texel in a picture 512 texels wide, of
-//!   256 in one half or twice as wide, and so is the step along them: half a step each, at the last of the four 2 / 512 or 2 / 256 texel.
+//! - where one sheet shows, positions are packed in tiles of n by n pixels, four or eight: to the nearest of 512 steps a texel in a picture 512 texels
+//!   wide, of 256 in one half or twice as wide, and so are the step along a row, that from row to row and what that adds to the other: n^2 / 2 steps.
 //!
 //! Where space is cubic, a span is half a cell long, and a value halfway between others is rounded downwards, to at most 1 / 2^16 less,
 //! and up to 5/4 as far off as these: after two such steps, down and across, 6 / 2^17 instead of the layer's 1 / 2^17.

@@ -105,6 +105,27 @@ fn a_camera_that_stands_still_shows_one_picture() {
 }
 
 #[test]
+fn blocks_of_one_sheet_have_no_outlines_even_where_they_are_drawn_pixel_by_pixel() {
+    // In a picture 128 texels wide there are no runs.
+    let mut settings = Settings::default();
+    settings.atlas.max_side = 128;
+    let bytes = scenes::bundle("street", [96, 64], 3, &settings).expect("a built-in scene bakes");
+    play::visit(&bytes, [1], |_, player| {
+        let (plain, torn) = (play::pixels(player), player.work().torn_pixels as usize);
+        let before = player.work().smoothed_pixels;
+        let smooth = play::whole(player, |player, y, out| player.smooth_row(y, out));
+        let smoothed = (player.work().smoothed_pixels - before) as usize;
+        let changed = plain.iter().zip(&smooth).filter(|(a, b)| a != b).count();
+        assert!(
+            0 < changed && changed <= smoothed && smoothed <= torn && torn < plain.len(),
+            "{changed}, {smoothed}, {torn} of {}",
+            plain.len()
+        );
+    })
+    .expect("it plays");
+}
+
+#[test]
 fn antialiased_outlines_are_means_and_nothing_else_changes() {
     let bytes = scenes::bundle("street", [96, 64], 3, &Settings::default()).expect("a built-in scene bakes");
     play::visit(&bytes, [1], |_, player| {

@@ -49,7 +49,7 @@ pub struct Material {
     pub texture: Option<u32>,
     /// Texels whose alpha is below this are holes that rays pass through; `None`: opaque.
     pub alpha_cutoff: Option<f32>,
-    /// Multiplies the texture's alpha (base colour factor's alpha times vertex alpha is not supported).
+    /// Alpha of the base colour factor: multiplies the texture's. That of vertices is ignored.
     pub alpha: f32,
     /// Shown as it is, whatever lights there are.
     pub unlit: bool,

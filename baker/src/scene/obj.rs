@@ -5,7 +5,7 @@ use super::error::{SceneError, Warnings};
 use super::model::{MAX_TRIANGLES, Model, too_many};
 use super::picture;
 use super::{Material, Texture, Triangle, Wrap};
-use crate::files::read as read_file;
+use crate::files::{beside, read as read_file};
 use glam::{DVec3, Vec2, Vec3};
 use std::cell::RefCell;
 use std::path::{Path, PathBuf};
@@ -173,7 +173,7 @@ fn check(text: &str, warnings: &mut Warnings) -> Result<String, String> {
 
 /// Reads a material library, of it only the lines that are shown: anything else in it may be as odd as it likes.
 fn read_library(name: &Path, folder: &Path) -> Result<tobj::MTLLoadResult, String> {
-    let path = find(&name.to_string_lossy(), folder);
+    let path = beside(&name.to_string_lossy(), folder);
     let bytes = read_file(&path).map_err(|e| format!("material library {}: {e}: its materials are left white", path.display()))?;
     let text = String::from_utf8_lossy(&bytes);
     let known = ["newmtl", "Kd", "Ke", "d", "Tr", "map_Kd", "map_d"];
@@ -184,12 +184,6 @@ fn read_library(name: &Path, folder: &Path) -> Result<tobj::MTLLoadResult, Strin
         return Err(format!("material library {}: {e}: its materials are left white", path.display()));
     }
     Ok(loaded)
-}
-
-/// A file named in another, with either kind of slash.
-fn find(name: &str, folder: &Path) -> PathBuf {
-    let path = folder.join(name);
-    if path.exists() { path } else { folder.join(name.replace('\\', "/")) }
 }
 
 /// The file name at the end of a map statement, after its options.
@@ -261,9 +255,9 @@ fn look(m: &tobj::Material, folder: &Path, textures: &mut Shelf, warnings: &mut 
     let mut out = Material { colour: m.diffuse.map_or(Vec3::ONE, Vec3::from), ..Material::default() };
     let name = &m.name;
     if let Some(statement) = &m.diffuse_texture {
-        let mask = m.dissolve_texture.as_ref().map(|s| find(map_name(s), folder));
+        let mask = m.dissolve_texture.as_ref().map(|s| beside(map_name(s), folder));
         let has_mask = mask.is_some();
-        out.texture = Some(textures.get(find(map_name(statement), folder), mask).map_err(|e| format!("material \"{name}\": {e}"))?);
+        out.texture = Some(textures.get(beside(map_name(statement), folder), mask).map_err(|e| format!("material \"{name}\": {e}"))?);
         if has_mask {
             out.alpha_cutoff = Some(0.5);
         }

@@ -5,7 +5,7 @@ use super::error::SceneError;
 use super::model::{MAX_TRIANGLES, Model, too_many};
 use super::picture;
 use super::{Material, Triangle, Wrap};
-use crate::files::read as read_file;
+use crate::files::{beside, read as read_file};
 use glam::{DVec3, Vec2, Vec3};
 use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType};
@@ -170,7 +170,7 @@ fn model(bytes: &[u8], folder: &Path, fallback: Option<&Path>) -> Result<Model, 
     }
     let has = |names: &[&str]| header.elements.get("vertex").is_some_and(|e| names.iter().any(|n| e.properties.contains_key(*n)));
     model.coloured = has(&["red", "r", "diffuse_red"]);
-    let texture = header.comments.iter().find_map(|c| c.trim().strip_prefix("TextureFile")).map(|n| folder.join(n.trim()));
+    let texture = header.comments.iter().find_map(|c| c.trim().strip_prefix("TextureFile")).map(|n| beside(n.trim(), folder));
     let texture = texture.or_else(|| fallback.map(Path::to_owned));
     let mut material = Material::default();
     if let Some(path) = texture {

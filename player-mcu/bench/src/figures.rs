@@ -125,14 +125,22 @@ pub fn round(x: f64) -> f64 {
 const BEGIN: &str = "<!-- figures: written by run -->";
 const END: &str = "<!-- end of figures -->";
 
-/// Puts the table between the marks in `readme`.
+/// Puts `table` between two marks in `readme`.
 ///
 /// # Errors
 /// A file that cannot be read or written, or has no marks.
-pub fn write_table(readme: &Path, results: &Results) -> Result<()> {
+pub fn put_table(readme: &Path, [begin, end]: [&str; 2], table: &str) -> Result<()> {
     let text = fs::read_to_string(readme).with_context(|| readme.display().to_string())?;
-    let (before, rest) = text.split_once(BEGIN).with_context(|| format!("{}: no line {BEGIN}", readme.display()))?;
-    let (_, after) = rest.split_once(END).with_context(|| format!("{}: no line {END}", readme.display()))?;
+    let (before, rest) = text.split_once(begin).with_context(|| format!("{}: no line {begin}", readme.display()))?;
+    let (_, after) = rest.split_once(end).with_context(|| format!("{}: no line {end}", readme.display()))?;
+    fs::write(readme, format!("{before}{begin}\n{table}\n{end}{after}")).with_context(|| readme.display().to_string())
+}
+
+/// Puts the tables of `results` into `readme`.
+///
+/// # Errors
+/// Those of [`put_table`].
+pub fn write_table(readme: &Path, results: &Results) -> Result<()> {
     let mut table = String::from(
         "\n| target | scene | instr/px | worst / mean | keys | loading | drawing | smooth, per smooth px | torn, per torn px | torn | working memory | stack | code |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
     );
@@ -185,5 +193,5 @@ pub fn write_table(readme: &Path, results: &Results) -> Result<()> {
             );
         }
     }
-    fs::write(readme, format!("{before}{BEGIN}\n{table}{rows}{pico}\n{END}{after}")).with_context(|| readme.display().to_string())
+    put_table(readme, [BEGIN, END], &format!("{table}{rows}{pico}"))
 }

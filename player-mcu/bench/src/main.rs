@@ -4,6 +4,7 @@
 //! puts the figures into RESULTS (JSON: target, then scene) and the tables of README.
 //! `cubist-mcu rp2040 SCENE FIRMWARE BUNDLE CODE_BYTES RAM_BYTES DISPLAY EMULATOR RESULTS README` does the same with a Pico's.
 //! `cubist-mcu rows KIND TARGET SCENE FIRMWARE BUNDLE CODE_BYTES RESULTS README` does it with a firmware that draws its rows in another way.
+//! `cubist-mcu sizes TARGET README NAME:SPEED:SIZE...` puts the sizes of the least player and of effects into the table of README.
 //! Figures above what `limits.json` allows are errors, once they are written.
 //! `cubist-mcu frames BUNDLE OUT` writes the host's frames, for the emulator, and prints their size.
 //! `cubist-mcu card WIDTHxHEIGHT OUT` writes the test card's scene, for the baker, into the folder OUT.
@@ -15,6 +16,7 @@ mod host;
 mod limits;
 mod pico;
 mod qemu;
+mod sizes;
 
 use anyhow::{Context, Result, bail};
 use figures::{Measured, Results};
@@ -46,6 +48,7 @@ fn main() -> Result<()> {
             );
             write("rp2040", scene, Measured::Cycles(found), results, readme)?;
         }
+        ["sizes", target, readme, ref programs @ ..] => sizes::tell(Path::new("limits.json"), target, Path::new(readme), programs)?,
         [target, scene, firmware, bundle, code, results, readme] => {
             let played = with_scratch(|scratch| qemu::play(Path::new(firmware), scratch));
             let expected = host::play(Path::new(bundle), |player, y, out| player.row(y, out));
@@ -78,7 +81,7 @@ fn main() -> Result<()> {
             write_all(&all, results, readme)?;
         }
         _ => bail!(
-            "usage: cubist-mcu TARGET SCENE FIRMWARE BUNDLE CODE_BYTES RESULTS README\n       cubist-mcu rp2040 SCENE FIRMWARE BUNDLE CODE_BYTES RAM_BYTES DISPLAY EMULATOR RESULTS README\n       cubist-mcu rows KIND TARGET SCENE FIRMWARE BUNDLE CODE_BYTES RESULTS README\n       cubist-mcu frames BUNDLE OUT\n       cubist-mcu card WIDTHxHEIGHT OUT"
+            "usage: cubist-mcu TARGET SCENE FIRMWARE BUNDLE CODE_BYTES RESULTS README\n       cubist-mcu rp2040 SCENE FIRMWARE BUNDLE CODE_BYTES RAM_BYTES DISPLAY EMULATOR RESULTS README\n       cubist-mcu rows KIND TARGET SCENE FIRMWARE BUNDLE CODE_BYTES RESULTS README\n       cubist-mcu sizes TARGET README NAME:SPEED:SIZE...\n       cubist-mcu frames BUNDLE OUT\n       cubist-mcu card WIDTHxHEIGHT OUT"
         ),
     }
     Ok(())

@@ -1,6 +1,6 @@
 //! Why a bundle does not play, told by the Pico's own light: so many flashes, a pause, and again, while the display shows the test card.
 
-use cubist_core::{BundleError, MemoryError};
+use cubist_core::BundleError;
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::OutputPin;
 
@@ -22,13 +22,6 @@ pub enum Fault {
 impl From<BundleError> for Fault {
     fn from(error: BundleError) -> Self {
         if error == BundleError::NotABundle { Self::NoBundle } else { Self::Broken }
-    }
-}
-
-impl From<MemoryError> for Fault {
-    fn from(_: MemoryError) -> Self {
-        // All kinds of texels are known here: what is left is too little memory.
-        Self::Memory
     }
 }
 

@@ -4,7 +4,7 @@
 //! wall's plane. Two mirrors at a right angle need three such rooms: one behind each, and one behind both, mirrored
 //! twice, which closes the group; so what the openings show is what the mirrors would. A mirrored room shows the same
 //! pictures as the room, but every point of it is a surface point of its own with texels of its own. True reflections,
-//! by bouncing rays at playback's surfaces, come with the mirrors effect.
+//! by bouncing rays at playback's surfaces, are not there yet.
 
 use super::builder::{Builder, FOCAL, Island, Rect, Shelf, look};
 use super::noise::fractal;

@@ -1,5 +1,5 @@
 //! Lattice noise: what gives the built-in scenes' textures and terrain their grain.
-//! Coordinates and a seed come in; values in 0..1 go to `textures` and `terrain`. Integer hashing and
+//! Coordinates and a seed come in; values in 0..1 go to the pictures on scenes' surfaces. Integer hashing and
 //! plain arithmetic only, so every host computes the same bits.
 
 /// A pseudo-random value in 0..1 for the lattice point (`x`, `y`) of the lattice `seed`.

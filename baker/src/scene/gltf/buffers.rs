@@ -1,7 +1,7 @@
 //! The bytes a glTF file names: its binary chunk, data URIs, files beside it; never the network.
 //! The document comes from `document`; bytes go to `accessor` and to the textures.
 
-use crate::files::read as read_file;
+use crate::files::{read as read_file, rooted};
 use ::gltf::json::Root;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -86,7 +86,6 @@ pub(crate) fn locate(uri: &str, folder: &Path) -> Result<Location, String> {
         ));
     }
     let decoded = percent_decode(uri);
-    let rooted = |path: &[u8]| matches!(path, [b'/' | b'\\', ..] | [_, b':', ..]);
     if rooted(uri.as_bytes()) || rooted(&decoded) {
         return Err(format!("URI \"{uri}\": an absolute path is not read; expected one relative to the file: put what it names beside it"));
     }

@@ -18,9 +18,8 @@ fn main() -> ! {
     let Ok(bundle) = &parsed else { fail("no bundle that this player knows") };
     let needed = bundle.memory_needed();
     let Some(memory) = MEMORY.get_mut(..needed) else { fail("too little memory") };
-    // By reference: moved out of its result the player would be on the stack twice.
-    let mut made = Player::new(bundle, memory);
-    let Ok(player) = &mut made else { fail("a bundle of other texels") };
+    let mut place = None;
+    let Ok(player) = Player::put(&mut place, bundle, memory) else { fail("a bundle of other texels") };
     for number in 0..bundle.frames() {
         // Shown again, a frame decodes nothing: the first time is measured.
         frame(&mut clock, |display| {
