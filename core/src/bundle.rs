@@ -31,6 +31,8 @@ impl<'a> Bundle<'a> {
     /// # Errors
     /// [`BundleError`] names what is wrong: not a bundle, damaged, of another version, or with a
     /// field out of range.
+    // Not part of its callers: what it takes of the stack is free again before what it returns goes anywhere.
+    #[inline(never)]
     pub fn parse(bytes: &'a [u8]) -> Result<Self, BundleError> {
         let (envelope, rest) = postcard::take_from_bytes::<Envelope<'a>>(bytes).map_err(|_| {
             if bytes.starts_with(&MAGIC) { BundleError::Truncated { length: bytes.len() } } else { BundleError::NotABundle }

@@ -70,12 +70,18 @@ struct Stage<'b, W, T> {
 }
 
 impl<W: OutputPin, T: StatefulOutputPin> Stage<'_, W, T> {
-    /// Draws `frame`, strip by strip, and sends it; the last strip may be on its way still.
+    /// Shows `frame`; its last strip may be on its way still.
     fn show(&mut self, player: &mut Player<'_, AnyTexels>, frame: u32) {
         // The chip's own pins cannot fail.
         let _turned = self.turn.toggle();
         let _high = self.working.set_high();
         player.seek(Frame(frame));
+        self.draw(player);
+    }
+
+    /// Draws the current frame, strip by strip, and sends it. A function of its own: seeking takes the stack deepest, and must not find this there.
+    #[inline(never)]
+    fn draw(&mut self, player: &mut Player<'_, AnyTexels>) {
         let (width, height) = player.bundle().size();
         for top in (0..height).step_by(ROWS as usize) {
             let rows = ROWS.min(height - top);
@@ -109,23 +115,25 @@ impl<W: OutputPin, T: StatefulOutputPin> Stage<'_, W, T> {
     }
 }
 
-/// Whether `bundle` can be played here.
-fn fits<'a>(bundle: Bundle<'a>, screen: (u32, u32)) -> Result<Bundle<'a>, Fault> {
+/// Why `bundle` cannot be played here, if so.
+fn misfit(bundle: &Bundle<'_>, screen: (u32, u32)) -> Option<Fault> {
     let (width, height) = bundle.size();
     if width > screen.0 || height > screen.1 {
-        return Err(Fault::Size);
+        return Some(Fault::Size);
     }
-    if bundle.memory_needed() > ROOM { Err(Fault::Memory) } else { Ok(bundle) }
+    (bundle.memory_needed() > ROOM).then_some(Fault::Memory)
 }
 
-/// Puts what there is to play into its place, or the test card and what kept it from being played. A function of its own, and so the next: what
-/// they take of the stack is free again when frames are played.
-#[inline(never)]
+/// What there is to play, in its place, or the test card and what kept that from being played.
 fn find(place: &'static mut Option<Bundle<'static>>, screen: (u32, u32)) -> (Option<&'static Bundle<'static>>, Option<Fault>) {
-    let found = slot::bundle().map_err(Fault::from).and_then(|bundle| fits(bundle, screen));
-    let fault = found.as_ref().err().copied();
+    let fault = match slot::open(place) {
+        Ok(()) => place.as_ref().and_then(|bundle| misfit(bundle, screen)),
+        Err(error) => Some(error.into()),
+    };
     // The card fits: the emulator shows it with every change.
-    *place = found.or_else(|_| Bundle::parse(CARD)).ok();
+    if fault.is_some() && slot::parse(place, CARD).is_err() {
+        *place = None;
+    }
     (place.as_ref(), fault)
 }
 

@@ -11,19 +11,32 @@ const ROOM: usize = 1 << 20;
 /// The bundle that was linked in; empty: none was.
 static LINKED: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/bundle.cubist"));
 
-/// The bundle to play.
+/// Puts the bundle to play into its place.
 ///
 /// # Errors
 /// Those of [`Bundle::parse`]; `NotABundle` where the flash holds none.
-pub fn bundle() -> Result<Bundle<'static>, BundleError> {
-    if LINKED.is_empty() { first(flash()) } else { Bundle::parse(LINKED) }
+pub fn open(place: &mut Option<Bundle<'static>>) -> Result<(), BundleError> {
+    let bytes = if LINKED.is_empty() { flash() } else { LINKED };
+    match parse(place, bytes) {
+        // Nothing says how long a bundle in flash is but itself, and parsing how much follows it.
+        Err(BundleError::TrailingBytes { count }) => parse(place, bytes.get(..bytes.len().saturating_sub(count)).unwrap_or(bytes)),
+        done => done,
+    }
 }
 
-/// The bundle that `bytes` begin with: nothing says how long it is but itself, and parsing how much follows it.
-fn first(bytes: &'static [u8]) -> Result<Bundle<'static>, BundleError> {
+/// Puts the bundle in `bytes` into its place. A function of its own: what it takes of the stack is free again afterwards.
+///
+/// # Errors
+/// Those of [`Bundle::parse`].
+#[inline(never)]
+pub fn parse(place: &mut Option<Bundle<'static>>, bytes: &'static [u8]) -> Result<(), BundleError> {
+    // With `?` the bundle would be on the stack twice.
     match Bundle::parse(bytes) {
-        Err(BundleError::TrailingBytes { count }) => Bundle::parse(bytes.get(..bytes.len().saturating_sub(count)).unwrap_or(bytes)),
-        found => found,
+        Ok(bundle) => {
+            *place = Some(bundle);
+            Ok(())
+        }
+        Err(error) => Err(error),
     }
 }
 

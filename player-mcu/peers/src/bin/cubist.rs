@@ -18,7 +18,7 @@ fn main() -> ! {
     let Ok(bundle) = &parsed else { fail("no bundle that this player knows") };
     let needed = bundle.memory_needed();
     let Some(memory) = MEMORY.get_mut(..needed) else { fail("too little memory") };
-    let mut place = None;
+    let mut place: Option<Player<'_>> = None;
     let Ok(player) = Player::put(&mut place, bundle, memory) else { fail("a bundle of other texels") };
     for number in 0..bundle.frames() {
         // Shown again, a frame decodes nothing: the first time is measured.
