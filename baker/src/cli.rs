@@ -128,7 +128,7 @@ pub struct Bake {
     /// Auto takes 0.01, 0.05, 0.2 or 1, the coarsest that pays: halving the keys' bytes may cost 1.5 dB. Rough land is as good at 1; a flat
     /// picture of fine stripes needs 0.01. Searches (--budget, --psnr) choose on their own.
     #[arg(long, value_name = "WORTH", value_parser = lambda)]
-    pub lambda: Option<f64>,
+    pub lambda: Option<Worth>,
     /// Every Nth key needs no earlier one: a seek decodes at most N + 1 keys.
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=1000))]
     pub independent_every: u16,
@@ -361,7 +361,10 @@ impl Bake {
                 Rewarp::Off => Some(false),
                 Rewarp::On => Some(true),
             },
-            lambda: self.lambda.map(|lambda| lambda as f32),
+            lambda: match self.lambda {
+                None | Some(Worth::Auto) => None,
+                Some(Worth::Of(worth)) => Some(worth as f32),
+            },
             independent_every: self.independent_every.into(),
             goal,
             truth: self.truth,
@@ -412,8 +415,20 @@ fn density(text: &str) -> Result<f64, String> {
     ranged(text, 0.05..=8.0, "texels a pixel")
 }
 
-fn lambda(text: &str) -> Result<f64, String> {
-    ranged(text, 0.0..=100.0, "what a bit is worth")
+/// What a bit of the keys is worth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Worth {
+    /// What pays.
+    Auto,
+    /// This.
+    Of(f64),
+}
+
+fn lambda(text: &str) -> Result<Worth, String> {
+    if text == "auto" {
+        return Ok(Worth::Auto);
+    }
+    ranged(text, 0.0..=100.0, "auto, or what a bit is worth").map(Worth::Of)
 }
 
 fn psnr(text: &str) -> Result<f64, String> {

@@ -30,7 +30,7 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            tell(format_args!("error: {error:#}"));
             ExitCode::from(1)
         }
     }
@@ -71,21 +71,34 @@ fn bake(name: &str, output: &Path, args: &Bake) -> Result<()> {
         return Ok(());
     }
     for warning in &baked.report.warnings {
-        eprintln!("warning: {name}: {warning}");
+        tell(format_args!("warning: {name}: {warning}"));
     }
     print(&aligned(&report::table(&baked.report)))
 }
 
-/// Refuses, as wrong usage, to write over the scene, or the report over the bundle.
+/// A line for people. Where there is nobody to read it, so be it.
+fn tell(line: std::fmt::Arguments<'_>) {
+    let _unread = writeln!(std::io::stderr(), "{line}");
+}
+
+/// What scenes are read from, by the ends of their files' names.
+const INPUTS: [&str; 12] = ["toml", "glb", "gltf", "obj", "mtl", "ply", "png", "jpg", "jpeg", "gif", "tif", "tiff"];
+
+/// Refuses, as wrong usage, to write over the scene, or the report over the bundle; or to a name that only files of scenes have.
 fn distinct(scene: &str, output: &Path, report: Option<&Path>) {
-    let clash = if files::same(output, Path::new(scene)) {
-        Some(format!("-o {}: that is the scene, which the bundle would replace; name another file", output.display()))
-    } else {
-        report.and_then(|report| {
-            let other = [("scene", Path::new(scene)), ("bundle", output)].into_iter().find(|(_, path)| files::same(report, path))?.0;
-            Some(format!("--report {}: that is the {other}, which the report would replace; name another file", report.display()))
-        })
-    };
+    let written = [("-o", Some(output)), ("--report", report)];
+    let written = written.into_iter().filter_map(|(option, path)| Some((option, path?)));
+    let clash = written.clone().find_map(|(option, path)| {
+        let others = [("scene", Path::new(scene)), ("bundle", output)];
+        let other = others.into_iter().take(if option == "-o" { 1 } else { 2 }).find(|(_, other)| files::same(path, other))?.0;
+        Some(format!("{option} {}: that is the {other}, which would be replaced; name another file", path.display()))
+    });
+    let clash = clash.or_else(|| {
+        let input =
+            |path: &Path| path.extension().and_then(|end| end.to_str()).is_some_and(|end| INPUTS.contains(&&*end.to_ascii_lowercase()));
+        let (option, path) = written.clone().find(|(_, path)| input(path))?;
+        Some(format!("{option} {}: so a scene's own files are called; expected OUT.cubist, or OUT.json for a report", path.display()))
+    });
     if let Some(clash) = clash {
         Cli::command().error(ErrorKind::ArgumentConflict, clash).exit();
     }

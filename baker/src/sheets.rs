@@ -27,10 +27,13 @@ pub struct KeyGrid {
 }
 
 impl KeyGrid {
-    /// Cells of 2^`cell_log2` pixels, keys every `interval` frames; without a loop the last key stands at the last frame.
+    /// Cells of 2^`cell_log2` pixels, keys every `interval` frames, closer on loops that are no longer than that; without a loop the last key stands at
+    /// the last frame.
     #[must_use]
     pub fn new(gbuffer: &GBuffer, cell_log2: u8, interval: u32, looping: bool, [time, space]: [u8; 2]) -> Self {
         let last = gbuffer.frames.saturating_sub(1);
+        // With a single key a loop would stand still.
+        let interval = if looping && interval >= gbuffer.frames { gbuffer.frames.div_ceil(3) } else { interval };
         let mut keys: Vec<u32> = (0..gbuffer.frames).step_by(interval.max(1) as usize).collect();
         if !looping && keys.last() != Some(&last) {
             // A last interval of a frame or two costs a whole key: the one before it is made longer instead.
@@ -328,6 +331,16 @@ impl Chain {
 mod tests {
     use super::*;
     use cubist_core::format::SPACE_CUBIC;
+
+    #[test]
+    fn a_short_loop_has_keys_to_move_between() {
+        let keys = |frames: u32, looping: bool| {
+            let gbuffer = GBuffer { width: 8, height: 8, frames, label: Vec::new(), uv: Vec::new().into() };
+            KeyGrid::new(&gbuffer, 3, 8, looping, [TIME_CUBIC, SPACE_CUBIC]).keys
+        };
+        assert_eq!([1, 2, 3, 8, 9].map(|frames| keys(frames, true)), [vec![0], vec![0, 1], vec![0, 1, 2], vec![0, 3, 6], vec![0, 8]]);
+        assert_eq!(keys(8, false), [0, 7]);
+    }
 
     #[test]
     fn nodes_carry_no_more_layers_than_there_is_room_for() {

@@ -44,6 +44,8 @@ fn the_scene_and_the_bundle_are_never_written_over() {
     refused(&bake(dir.path(), "a.obj", &["-o", "./a.obj"]), 2, "that is the scene");
     refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--report", "./a.cubist"]), 2, "that is the bundle");
     refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--report", "a.obj"]), 2, "that is the scene");
+    refused(&bake(dir.path(), "a.obj", &["-o", "Wall.PNG"]), 2, "so a scene's own files are called");
+    refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--report", "b.obj"]), 2, "so a scene's own files are called");
     assert_eq!(std::fs::read_to_string(dir.path().join("a.obj")).unwrap(), TRIANGLE);
     assert_eq!(names(dir.path()), ["a.obj"]);
 }

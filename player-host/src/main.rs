@@ -25,11 +25,12 @@ mod window;
 use anyhow::Result;
 use clap::Parser;
 use cli::{Cli, Command, Show, Usage};
-use cubist_baker::files::clean_up_when_interrupted;
+use cubist_baker::files::{clean_up_when_interrupted, same};
 use cubist_core::Bundle;
 use input::Loaded;
 use picture::Player;
 use stage::Stage;
+use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -46,21 +47,33 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {error:#}");
+            tell(format_args!("error: {error:#}"));
             ExitCode::from(if error.is::<Usage>() { 2 } else { 1 })
         }
     }
 }
 
+/// A line for people. Where there is nobody to read it, so be it.
+fn tell(line: std::fmt::Arguments<'_>) {
+    let _unread = writeln!(std::io::stderr(), "{line}");
+}
+
 /// The window, or files where there is no display.
 fn show(args: &Show) -> Result<()> {
+    if let (Some(shot), Some(input)) = (&args.shot, &args.input)
+        && same(shot, input)
+    {
+        return Err(
+            Usage(format!("--shot {}: that is the bundle, which the picture would replace; name another file", shot.display())).into()
+        );
+    }
     let events = if args.headless {
         None
     } else {
         window::connect()
             .inspect_err(|reason| {
                 let instead = args.shot.as_deref().unwrap_or(&args.out).display();
-                eprintln!("No display ({reason}): writing files instead of opening a window: {instead}");
+                tell(format_args!("No display ({reason}): writing files instead of opening a window: {instead}"));
             })
             .ok()
     };

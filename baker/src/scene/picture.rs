@@ -2,7 +2,7 @@
 //! Bytes come from the loaders; textures go to `Scene`.
 
 use super::{Texture, Wrap};
-use image::{DynamicImage, ImageReader, Limits};
+use image::{DynamicImage, ImageFormat, ImageReader, Limits};
 use std::io::Cursor;
 
 /// No side of a picture may be longer, texels.
@@ -41,6 +41,13 @@ fn broken(error: image::ImageError, texels: u64) -> String {
     }
 }
 
+/// Whether a JPEG's last scan is followed by the marker of its end. Neither marker can stand in a scan's data; those of a preview come before it.
+fn ends(bytes: &[u8]) -> bool {
+    let marker = |kind: u8| move |at: &[u8]| at == [0xff, kind];
+    let scan = bytes.windows(2).rposition(marker(0xda)).and_then(|at| bytes.get(at..));
+    scan.is_none_or(|scan| scan.windows(2).any(marker(0xd9)))
+}
+
 /// Decodes a PNG, JPEG or GIF (its first picture) of at most `texels` texels, within the limits of sides and bytes.
 pub(crate) fn decode(bytes: &[u8], texels: u64) -> Result<DynamicImage, String> {
     // As it says of itself, before room is made for it.
@@ -49,6 +56,10 @@ pub(crate) fn decode(bytes: &[u8], texels: u64) -> Result<DynamicImage, String> 
         return Err(too_large(texels));
     }
     let mut reader = open(bytes)?;
+    // The decoder fills with grey what a JPEG that was cut short lacks.
+    if reader.format() == Some(ImageFormat::Jpeg) && !ends(bytes) {
+        return Err("the picture is broken (the file ends early): export it again".to_owned());
+    }
     let mut limits = Limits::default();
     limits.max_image_width = Some(MAX_SIDE);
     limits.max_image_height = Some(MAX_SIDE);
@@ -112,6 +123,19 @@ mod tests {
         let small = reduce(&Texture { width: 4, height: 3, texels, wrap: [Wrap::Clamp; 2] }, 2).unwrap();
         assert_eq!((small.width, small.height), (2, 2));
         assert_eq!(small.texels, [[25, 0, 0, 255], [45, 0, 0, 255], [85, 0, 0, 255], [105, 0, 0, 255]]);
+    }
+
+    #[test]
+    fn a_jpeg_that_was_cut_short_is_refused() {
+        let mut bytes = Cursor::new(Vec::new());
+        let noise = image::RgbImage::from_fn(64, 64, |x, y| image::Rgb([((x * 37) ^ (y * 91)) as u8, (x * y) as u8, (x + y) as u8]));
+        noise.write_to(&mut bytes, ImageFormat::Jpeg).unwrap();
+        let bytes = bytes.into_inner();
+        assert!(decode(&bytes, MAX_TEXELS).is_ok());
+        for part in [bytes.len() - 1, bytes.len() / 2] {
+            let error = decode(&bytes[..part], MAX_TEXELS).unwrap_err();
+            assert!(error.contains("broken"), "{part} of {}: {error}", bytes.len());
+        }
     }
 
     #[test]
