@@ -8,50 +8,38 @@ use rayon::prelude::*;
 
 /// A place that moves farther than this from one frame to the next, texels, is another place.
 const FAR: f32 = 32.0;
-/// At a cut at least this share of the screen, background aside, sees another place, percent.
+/// At a cut this share of the screen, background aside, sees another place, percent, and
 const MOST: usize = 60;
-/// In the steps from frame to frame just before and just after a cut at most this share does.
+/// from the frame before to the last before it, and after it likewise, at most this.
 const LEAST: usize = 20;
 /// A key that sees more than this share of its pixels on surfaces that the next one sees nothing of, or the other way round, percent, is too far from it.
 const STRANGE: usize = 50;
 
-/// The frames of `grid`'s keys and those that cuts and turns ask for; `None` where none do.
+/// The frames of `grid`'s keys and those that cuts ask for; `None` where there is no cut.
 ///
 /// Between a key at the last frame before a cut and one at the first after it no frame is interpolated. The curve between others also
 /// looks one key farther: so two stand on either side.
 #[must_use]
 pub fn keys(gbuffer: &GBuffer, grid: &KeyGrid) -> Option<Vec<u32>> {
-    let frames = grid.frames;
-    // Steps from each frame to the next: on a loop the last leads back to the first.
-    let steps = if grid.looping { frames } else { frames - 1 };
-    let after = |frame: u32, on: u32| if grid.looping { Some((frame + on) % frames) } else { Some(frame + on).filter(|&at| at < frames) };
-    let jumps: Vec<usize> = (0..steps).into_par_iter().map(|frame| jump(gbuffer, grid.size, [frame, (frame + 1) % frames])).collect();
-    let mut cut: Vec<u32> = Vec::new();
-    for frame in 0..steps {
-        let before = if frame > 0 || grid.looping { Some((frame + frames - 1) % frames) } else { None };
-        let calm = |step: Option<u32>| step.and_then(|step| jumps.get(step as usize)).is_none_or(|&jump| jump <= LEAST);
-        if jumps[frame as usize] >= MOST && calm(before) && calm(after(frame, 1)) {
-            cut.extend(before.into_iter().chain([frame]).chain(after(frame, 1)).chain(after(frame, 2)));
-        }
-    }
-    let mut keys = cut.clone();
+    let last = grid.frames - 1;
+    let jumps: Vec<usize> = (0..last).into_par_iter().map(|frame| jump(gbuffer, grid.size, frame)).collect();
+    let calm = |frame: Option<usize>| frame.and_then(|frame| jumps.get(frame)).is_none_or(|&jump| jump <= LEAST);
+    let cuts = (0..jumps.len()).filter(|&at| jumps[at] >= MOST && calm(at.checked_sub(1)) && calm(Some(at + 1)));
+    let mut keys: Vec<u32> = cuts.map(|at| at as u32).flat_map(|at| at.saturating_sub(1)..=(at + 2).min(last)).collect();
+    let cut = keys.clone();
     keys.extend(&grid.keys);
     keys.sort_unstable();
     keys.dedup();
-    let seen: Vec<Vec<usize>> = (0..frames).into_par_iter().map(|frame| seen(gbuffer, grid.size, frame)).collect();
-    // The end of a loop's last interval.
-    keys.extend(grid.looping.then_some(frames));
+    let seen: Vec<Vec<usize>> = (0..grid.frames).into_par_iter().map(|frame| seen(gbuffer, grid.size, frame)).collect();
     let mut at = 0;
     while let Some(&[from, to]) = keys.get(at..at + 2) {
-        let end = to % frames;
-        let within = to > from + 1 && !cut.contains(&from) && !cut.contains(&end);
-        if within && strange(&seen[from as usize], &seen[end as usize]) {
+        let within = to > from + 1 && !cut.contains(&from) && !cut.contains(&to);
+        if within && strange(&seen[from as usize], &seen[to as usize]) {
             keys.insert(at + 1, from.midpoint(to));
         } else {
             at += 1;
         }
     }
-    keys.retain(|&key| key < frames);
     (keys != grid.keys).then_some(keys)
 }
 
@@ -82,11 +70,11 @@ fn strange(a: &[usize], b: &[usize]) -> bool {
     alone(a, b) || alone(b, a)
 }
 
-/// The share of the pixels, background aside, that see another place in the second of two frames than in the first, percent. Of all pixels: a fence whose boards
+/// The share of the pixels, background aside, that see another place in the frame after `frame`, percent. Of all pixels: a fence whose boards
 /// are as far apart as nodes passes all of those at once.
-fn jump(gbuffer: &GBuffer, [width, height]: [usize; 2], frames: [u32; 2]) -> usize {
+fn jump(gbuffer: &GBuffer, [width, height]: [usize; 2], frame: u32) -> usize {
     let (mut jumps, mut count) = (0, 0);
-    let frames = frames.map(|frame| frame as usize * width * height..(frame as usize + 1) * width * height);
+    let frames = [frame, frame + 1].map(|frame| frame as usize * width * height..(frame as usize + 1) * width * height);
     for (from, to) in frames[0].clone().zip(frames[1].clone()) {
         // Behind everything nothing moves.
         if gbuffer.label[from] == 0 && gbuffer.label[to] == 0 {
@@ -108,25 +96,12 @@ mod tests {
 
     /// Keys of 24 frames in which all of the screen is `shift(frame)` texels along a chart.
     fn of(shift: fn(u32) -> f32) -> Option<Vec<u32>> {
-        on_path(shift, false)
-    }
-
-    /// Likewise of a path that loops or does not.
-    fn on_path(shift: fn(u32) -> f32, looping: bool) -> Option<Vec<u32>> {
         let (width, height, frames) = (32, 24, 24);
         let places =
             (0..frames).flat_map(|frame| (0..width * height).map(move |at| [(at % width) as f32 + shift(frame), (at / width) as f32]));
         let uv: Vec<[f32; 2]> = places.collect();
         let gbuffer = GBuffer { width, height, frames, label: vec![1; uv.len()], uv: uv.into() };
-        keys(&gbuffer, &KeyGrid::new(&gbuffer, 3, 8, looping, [TIME_CUBIC, SPACE_CUBIC]))
-    }
-
-    #[test]
-    fn the_seam_of_a_loop_is_a_step_like_others() {
-        assert_eq!(on_path(|frame| frame as f32, true), None, "23 texels back are no jump");
-        assert_eq!(on_path(|frame| 2.0 * frame as f32, true), Some(vec![0, 1, 8, 16, 22, 23]), "46 are");
-        assert_eq!(of(|frame| 2.0 * frame as f32), None, "which nothing shows on a path that ends");
-        assert_eq!(on_path(|frame| frame as f32 + if frame > 0 { 100.0 } else { 0.0 }, true), None, "a frame alone is a flash, no cut");
+        keys(&gbuffer, &KeyGrid::new(&gbuffer, 3, 8, false, [TIME_CUBIC, SPACE_CUBIC]))
     }
 
     #[test]
@@ -138,15 +113,15 @@ mod tests {
     #[test]
     fn a_turn_gets_keys_until_two_see_something_in_common() {
         // A pillar every 16 pixels, a label each; the screen of 32 pixels passes `speed` pixels a frame.
-        let keys = |speed: usize, looping: bool| {
+        let keys = |speed: usize| {
             let (width, height, frames) = (32usize, 24usize, 24usize);
             let labels = (0..frames * height * width).map(|at| 1 + ((at % width + at / (width * height) * speed) / 16) as u16);
             let label: Vec<u16> = labels.collect();
             let gbuffer = GBuffer { width: 32, height: 24, frames: 24, uv: vec![[0.0; 2]; label.len()].into(), label };
-            keys(&gbuffer, &KeyGrid::new(&gbuffer, 3, 8, looping, [TIME_CUBIC, SPACE_CUBIC]))
+            keys(&gbuffer, &KeyGrid::new(&gbuffer, 3, 8, false, [TIME_CUBIC, SPACE_CUBIC]))
         };
-        assert_eq!(keys(1, false), None, "half of the first key's pillars are in the next");
-        assert_eq!(keys(4, false), Some(vec![0, 4, 8, 12, 16, 19, 23]), "a screen in eight frames: half of it in four");
+        assert_eq!(keys(1), None, "half of the first key's pillars are in the next");
+        assert_eq!(keys(4), Some(vec![0, 4, 8, 12, 16, 19, 23]), "a screen in eight frames: half of it in four");
     }
 
     #[test]
