@@ -123,12 +123,12 @@ pub struct Bake {
     /// Land that reaches from the camera to the horizon is then finer near than far. Auto tries it where --charts tries, after the best of those.
     #[arg(long, value_enum, value_name = "KIND", default_value_t = Rewarp::Auto)]
     pub rewarp: Rewarp,
-    /// What a bit of the keys is worth, 0 to 100 [default: auto]: more takes fewer bytes at less quality.
+    /// What a bit of the keys is worth, auto or 0 to 100: more takes fewer bytes at less quality.
     ///
     /// Auto takes 0.01, 0.05, 0.2 or 1, the coarsest that pays: halving the keys' bytes may cost 1.5 dB. Rough land is as good at 1; a flat
     /// picture of fine stripes needs 0.01. Searches (--budget, --psnr) choose on their own.
-    #[arg(long, value_name = "WORTH", value_parser = lambda)]
-    pub lambda: Option<Worth>,
+    #[arg(long, value_name = "WORTH", value_parser = lambda, default_value = "auto")]
+    pub lambda: Worth,
     /// Every Nth key needs no earlier one: a seek decodes at most N + 1 keys.
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=1000))]
     pub independent_every: u16,
@@ -362,8 +362,8 @@ impl Bake {
                 Rewarp::On => Some(true),
             },
             lambda: match self.lambda {
-                None | Some(Worth::Auto) => None,
-                Some(Worth::Of(worth)) => Some(worth as f32),
+                Worth::Auto => None,
+                Worth::Of(worth) => Some(worth as f32),
             },
             independent_every: self.independent_every.into(),
             goal,

@@ -33,6 +33,7 @@ pub mod shade;
 pub mod sheets;
 mod spare;
 pub mod tears;
+pub mod terminal;
 pub mod timing;
 pub mod trace;
 pub mod truth;

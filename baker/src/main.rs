@@ -11,10 +11,11 @@ use clap::{CommandFactory, Parser};
 use cli::{Bake, Cli, Command, Inspect, Playback, Throughput};
 use cubist_baker::inspect::Inspection;
 use cubist_baker::scene::Scene;
+use cubist_baker::terminal::{print, tell};
 use cubist_baker::{files, job, report, scene, trace};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
-use std::io::{IsTerminal, Write};
+use std::io::IsTerminal;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -76,32 +77,27 @@ fn bake(name: &str, output: &Path, args: &Bake) -> Result<()> {
     print(&aligned(&report::table(&baked.report)))
 }
 
-/// A line for people. Where there is nobody to read it, so be it.
-fn tell(line: std::fmt::Arguments<'_>) {
-    let _unread = writeln!(std::io::stderr(), "{line}");
-}
-
 /// What scenes are read from, by the ends of their files' names.
 const INPUTS: [&str; 12] = ["toml", "glb", "gltf", "obj", "mtl", "ply", "png", "jpg", "jpeg", "gif", "tif", "tiff"];
 
 /// Refuses, as wrong usage, to write over the scene, or the report over the bundle; or to a name that only files of scenes have.
 fn distinct(scene: &str, output: &Path, report: Option<&Path>) {
-    let written = [("-o", Some(output)), ("--report", report)];
-    let written = written.into_iter().filter_map(|(option, path)| Some((option, path?)));
-    let clash = written.clone().find_map(|(option, path)| {
-        let others = [("scene", Path::new(scene)), ("bundle", output)];
-        let other = others.into_iter().take(if option == "-o" { 1 } else { 2 }).find(|(_, other)| files::same(path, other))?.0;
-        Some(format!("{option} {}: that is the {other}, which would be replaced; name another file", path.display()))
-    });
-    let clash = clash.or_else(|| {
-        let input =
-            |path: &Path| path.extension().and_then(|end| end.to_str()).is_some_and(|end| INPUTS.contains(&&*end.to_ascii_lowercase()));
-        let (option, path) = written.clone().find(|(_, path)| input(path))?;
-        Some(format!("{option} {}: so a scene's own files are called; expected OUT.cubist, or OUT.json for a report", path.display()))
-    });
+    let others = [("scene", Path::new(scene)), ("bundle", output)];
+    let clash = clash("-o", output, &others[..1]).or_else(|| clash("--report", report?, &others));
     if let Some(clash) = clash {
         Cli::command().error(ErrorKind::ArgumentConflict, clash).exit();
     }
+}
+
+/// Why `option` may not write `path`, if so.
+fn clash(option: &str, path: &Path, others: &[(&str, &Path)]) -> Option<String> {
+    let shown = path.display();
+    if let Some((what, _)) = others.iter().find(|(_, other)| files::same(path, other)) {
+        return Some(format!("{option} {shown}: that is the {what}, which would be replaced; name another file"));
+    }
+    let end = path.extension()?.to_str()?.to_ascii_lowercase();
+    let inputs = INPUTS.contains(&end.as_str());
+    inputs.then(|| format!("{option} {shown}: so a scene's own files are called; expected OUT.cubist, or OUT.json for a report"))
 }
 
 fn inspect(args: &Inspect) -> Result<()> {
@@ -169,12 +165,4 @@ fn bar(quiet: bool) -> ProgressBar {
 fn aligned(rows: &[(String, String)]) -> String {
     let widest = rows.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
     rows.iter().map(|(name, value)| format!("{name:widest$}  {value}\n")).collect()
-}
-
-/// Writes to standard output; a reader that has seen enough (`| head`) is no error.
-fn print(text: &str) -> Result<()> {
-    match std::io::stdout().lock().write_all(text.as_bytes()) {
-        Err(error) if error.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
-        other => other.context("standard output cannot be written"),
-    }
 }

@@ -1,11 +1,12 @@
 //! What the user gave, as a bundle: read from a file, or baked from a scene.
-//! A path comes in from `cli`; checked bytes go to the commands. Their results go to standard output through here.
+//! A path comes in from `cli`; checked bytes go to the commands.
 
 use crate::bake::{Scene, bake};
+use crate::cli::Usage;
 use crate::progress::progress;
 use anyhow::{Context, Result, anyhow};
+use cubist_baker::files::same;
 use cubist_core::Bundle;
-use std::io::{ErrorKind, Write};
 use std::path::Path;
 
 /// The scene that plays when nothing is given.
@@ -52,12 +53,12 @@ pub fn memory(bundle: &Bundle<'_>) -> Result<Vec<u8>> {
     Ok(memory)
 }
 
-/// Prints a result; a reader that has gone away, as in `| head`, is no error.
-pub fn print(text: &str) -> Result<()> {
-    match writeln!(std::io::stdout(), "{text}") {
-        Err(error) if error.kind() != ErrorKind::BrokenPipe => Err(error).context("standard output cannot be written"),
-        _ => Ok(()),
+/// Refuses, as wrong usage, that `option` writes `path` over the bundle that plays.
+pub fn keep(bundle: &Path, option: &str, path: &Path) -> Result<()> {
+    if same(bundle, path) {
+        return Err(Usage(format!("{option} {}: that is the bundle, which would be replaced; name another file", path.display())).into());
     }
+    Ok(())
 }
 
 fn baked(name: String, scene: Scene<'_>) -> Result<Loaded> {

@@ -25,12 +25,12 @@ mod window;
 use anyhow::Result;
 use clap::Parser;
 use cli::{Cli, Command, Show, Usage};
-use cubist_baker::files::{clean_up_when_interrupted, same};
+use cubist_baker::files::clean_up_when_interrupted;
+use cubist_baker::terminal::{print, tell};
 use cubist_core::Bundle;
 use input::Loaded;
 use picture::Player;
 use stage::Stage;
-use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
@@ -53,19 +53,10 @@ fn main() -> ExitCode {
     }
 }
 
-/// A line for people. Where there is nobody to read it, so be it.
-fn tell(line: std::fmt::Arguments<'_>) {
-    let _unread = writeln!(std::io::stderr(), "{line}");
-}
-
 /// The window, or files where there is no display.
 fn show(args: &Show) -> Result<()> {
-    if let (Some(shot), Some(input)) = (&args.shot, &args.input)
-        && same(shot, input)
-    {
-        return Err(
-            Usage(format!("--shot {}: that is the bundle, which the picture would replace; name another file", shot.display())).into()
-        );
+    if let (Some(shot), Some(bundle)) = (&args.shot, &args.input) {
+        input::keep(bundle, "--shot", shot)?;
     }
     let events = if args.headless {
         None
@@ -80,7 +71,7 @@ fn show(args: &Show) -> Result<()> {
     with_player(args.input.as_deref(), |loaded, bundle, mut player| {
         let mut rows = measure::facts(loaded, bundle);
         rows.extend(loaded.rows.iter().cloned());
-        input::print(&measure::table(&rows))?;
+        print(&(measure::table(&rows) + "\n"))?;
         if events.is_none() && args.shot.is_none() {
             return headless::pictures(&mut player, &args.out, args.frames, args.scale.unwrap_or(1));
         }

@@ -1,11 +1,12 @@
 //! `cubist-player measure`: what a bundle costs.
 //! A bundle comes in and is played once from end to end; a table or one JSON document goes out.
 
-use crate::input::{Loaded, print};
+use crate::input::Loaded;
 use crate::overlay::grouped;
 use crate::picture::{Picture, Player};
 use crate::progress::progress;
 use anyhow::Result;
+use cubist_baker::terminal::print;
 use cubist_core::format::{ATLAS, Section};
 use cubist_core::{Bundle, Frame, Work};
 use serde_json::{Value, json};
@@ -60,7 +61,7 @@ pub fn run(loaded: &Loaded, bundle: &Bundle<'_>, player: &mut Player<'_>, as_jso
     let seconds = start.elapsed().as_secs_f64();
     bar.finish_and_clear();
     if as_json {
-        return print(&serde_json::to_string_pretty(&document(loaded, bundle, &spreads, seconds))?);
+        return print(&(serde_json::to_string_pretty(&document(loaded, bundle, &spreads, seconds))? + "\n"));
     }
     let mut rows = facts(loaded, bundle);
     rows.extend(bundle.sections().map(|s| (format!("section {}", tag(&s)), format!("{} bytes", grouped(s.bytes.len() as u64)))));
@@ -84,7 +85,7 @@ pub fn run(loaded: &Loaded, bundle: &Bundle<'_>, player: &mut Player<'_>, as_jso
         ));
     }
     rows.push(("keys a seek".to_owned(), format!("at most {}", bundle.limits().seek_keys)));
-    print(&table(&rows))
+    print(&(table(&rows) + "\n"))
 }
 
 /// What is known of a bundle before it plays, as rows of a table.

@@ -3,11 +3,12 @@
 
 use crate::cli::{Render, Texels, Usage};
 use crate::files::write_png;
-use crate::input::print;
+use crate::input;
 use crate::picture::{Draw, Picture, Player};
 use crate::progress::progress;
 use anyhow::{Context, Result};
-use cubist_baker::files::{same, write_with};
+use cubist_baker::files::write_with;
+use cubist_baker::terminal::print;
 use image::codecs::gif::{GifEncoder, Repeat};
 use image::{Delay, DynamicImage};
 use std::ops::Range;
@@ -42,10 +43,8 @@ pub fn run(player: &mut Player<'_>, args: &Render) -> Result<()> {
     if args.smooth && args.texels == Texels::Dithered {
         return Err(Usage("--smooth and --texels dithered: there are no such rows; take --texels nearest or bilinear".to_owned()).into());
     }
-    if let Some(gif) = plan.gif
-        && same(gif, &args.bundle)
-    {
-        return Err(Usage(format!("--gif {}: that is the bundle, which the GIF would replace; name another file", gif.display())).into());
+    if let Some(gif) = plan.gif {
+        input::keep(&args.bundle, "--gif", gif)?;
     }
     write(player, &plan)
 }
@@ -71,7 +70,7 @@ pub fn write(player: &mut Player<'_>, plan: &Plan<'_>) -> Result<()> {
             bar.inc(1);
         }
         bar.finish_and_clear();
-        print(&format!("{} frames in {}", frames.len(), folder.display()))?;
+        print(&format!("{} frames in {}\n", frames.len(), folder.display()))?;
     }
     if let Some(path) = plan.gif {
         let timed = delays(frames.len(), plan.every, player.bundle().fps());
@@ -91,7 +90,7 @@ pub fn write(player: &mut Player<'_>, plan: &Plan<'_>) -> Result<()> {
             Ok(())
         })?;
         bar.finish_and_clear();
-        print(&format!("{} frames in {}", timed.len(), path.display()))?;
+        print(&format!("{} frames in {}\n", timed.len(), path.display()))?;
     }
     Ok(())
 }

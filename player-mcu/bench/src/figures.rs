@@ -2,10 +2,10 @@
 
 use crate::host::Expected;
 use crate::qemu::{FrameLine, Played};
+use crate::table;
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fs;
 use std::path::Path;
 
 /// The figures of one scene on one target. Parts of a frame are instructions a pixel of the whole screen; those of smooth and torn
@@ -125,21 +125,10 @@ pub fn round(x: f64) -> f64 {
 const BEGIN: &str = "<!-- figures: written by run -->";
 const END: &str = "<!-- end of figures -->";
 
-/// Puts `table` between two marks in `readme`.
-///
-/// # Errors
-/// A file that cannot be read or written, or has no marks.
-pub fn put_table(readme: &Path, [begin, end]: [&str; 2], table: &str) -> Result<()> {
-    let text = fs::read_to_string(readme).with_context(|| readme.display().to_string())?;
-    let (before, rest) = text.split_once(begin).with_context(|| format!("{}: no line {begin}", readme.display()))?;
-    let (_, after) = rest.split_once(end).with_context(|| format!("{}: no line {end}", readme.display()))?;
-    fs::write(readme, format!("{before}{begin}\n{table}\n{end}{after}")).with_context(|| readme.display().to_string())
-}
-
 /// Puts the tables of `results` into `readme`.
 ///
 /// # Errors
-/// Those of [`put_table`].
+/// Those of [`table::put`].
 pub fn write_table(readme: &Path, results: &Results) -> Result<()> {
     let mut table = String::from(
         "\n| target | scene | instr/px | worst / mean | keys | loading | drawing | smooth, per smooth px | torn, per torn px | torn | working memory | stack | code |\n|---|---|---|---|---|---|---|---|---|---|---|---|---|\n",
@@ -193,5 +182,5 @@ pub fn write_table(readme: &Path, results: &Results) -> Result<()> {
             );
         }
     }
-    put_table(readme, [BEGIN, END], &format!("{table}{rows}{pico}"))
+    table::put(readme, [BEGIN, END], &format!("{table}{rows}{pico}"))
 }

@@ -17,6 +17,7 @@ mod limits;
 mod pico;
 mod qemu;
 mod sizes;
+mod table;
 
 use anyhow::{Context, Result, bail};
 use figures::{Measured, Results};

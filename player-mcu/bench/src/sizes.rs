@@ -1,6 +1,6 @@
 //! What playback takes of flash: the least player, and what each effect adds to it. `sizes/run` links and measures them.
 
-use crate::{figures, limits};
+use crate::{limits, table};
 use anyhow::{Context, Result};
 use serde::Serialize;
 use std::path::Path;
@@ -28,16 +28,16 @@ pub fn tell(file: &Path, target: &str, readme: &Path, programs: &[&str]) -> Resu
     let [(name, least), effects @ ..] = sizes.as_slice() else { return Ok(()) };
     println!("{target:<14} {name}: {} bytes compiled for speed, {} for size", least.code_bytes, least.small_code_bytes);
     if !effects.is_empty() {
-        let mut table = format!(
+        let mut rows = format!(
             "\n| on {target} | for speed | for size |\n|---|---|---|\n| **{name}** | {} B | {} B |\n",
             least.code_bytes, least.small_code_bytes
         );
         let more = |size: u64, least: u64| format!("{:+} B", size as i64 - least as i64);
         for (effect, size) in effects {
             let (speed, small) = (more(size.code_bytes, least.code_bytes), more(size.small_code_bytes, least.small_code_bytes));
-            table += &format!("| {effect} | {speed} | {small} |\n");
+            rows += &format!("| {effect} | {speed} | {small} |\n");
         }
-        figures::put_table(readme, [BEGIN, END], &table)?;
+        table::put(readme, [BEGIN, END], &rows)?;
     }
     limits::check(file, target, name, least)
 }

@@ -7,50 +7,22 @@
 #[cfg(feature = "allocates")]
 extern crate alloc;
 
-use core::convert::Infallible;
-use core::fmt::{self, Write};
+#[path = "../../sum.rs"]
+mod sum;
+
+use core::fmt::Write;
 use core::hint::black_box;
 use cortex_m_rt::entry;
 use cubist_core::{Bundle, BundleError, ByteOrder, Frame, MemoryError, Player, Probe};
-use embedded_graphics_core::Pixel;
-use embedded_graphics_core::draw_target::DrawTarget;
-use embedded_graphics_core::geometry::{OriginDimensions, Point, Size};
+use embedded_graphics_core::geometry::{Point, Size};
 use embedded_graphics_core::image::ImageDrawable;
-use embedded_graphics_core::pixelcolor::{IntoStorage, Rgb565};
 use embedded_graphics_core::primitives::Rectangle;
 // Its panic handler calls a symbol that does not exist: the link fails if a panic can be reached.
 use panic_never as _;
+use sum::Sum;
 
 /// What a bundle is to the compiler: bytes that it knows nothing about.
 static BYTES: [u8; 64] = [0; 64];
-
-/// A display that forgets what it is shown.
-struct Sum(u32);
-
-impl OriginDimensions for Sum {
-    fn size(&self) -> Size {
-        Size::new(320, 240)
-    }
-}
-
-impl DrawTarget for Sum {
-    type Color = Rgb565;
-    type Error = Infallible;
-
-    fn draw_iter<I: IntoIterator<Item = Pixel<Rgb565>>>(&mut self, pixels: I) -> Result<(), Infallible> {
-        for Pixel(_, colour) in pixels {
-            self.0 = self.0.wrapping_add(u32::from(colour.into_storage()));
-        }
-        Ok(())
-    }
-}
-
-impl Write for Sum {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        self.0 = text.bytes().map(u32::from).fold(self.0, u32::wrapping_add);
-        Ok(())
-    }
-}
 
 /// What `play` can meet.
 enum Trouble {

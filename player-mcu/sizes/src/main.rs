@@ -3,6 +3,10 @@
 #![no_std]
 #![no_main]
 
+#[cfg(any(feature = "image", feature = "texts"))]
+#[path = "../../sum.rs"]
+mod sum;
+
 use core::hint::black_box;
 use cortex_m_rt::entry;
 use cubist_core::{Bundle, Frame, Player};
@@ -20,49 +24,12 @@ type Texels = cubist_core::Indexed8;
 /// What a bundle is to the compiler: bytes that it knows nothing about.
 static BYTES: [u8; 64] = [0; 64];
 
-/// A display that forgets what it is shown.
-#[cfg(feature = "image")]
-mod display {
-    use core::convert::Infallible;
-    use embedded_graphics_core::Pixel;
-    use embedded_graphics_core::draw_target::DrawTarget;
-    use embedded_graphics_core::geometry::{OriginDimensions, Size};
-    use embedded_graphics_core::pixelcolor::{IntoStorage, Rgb565};
-
-    pub struct Sum(pub u32);
-
-    impl OriginDimensions for Sum {
-        fn size(&self) -> Size {
-            Size::new(320, 240)
-        }
-    }
-
-    impl DrawTarget for Sum {
-        type Color = Rgb565;
-        type Error = Infallible;
-
-        fn draw_iter<I: IntoIterator<Item = Pixel<Rgb565>>>(&mut self, pixels: I) -> Result<(), Infallible> {
-            for Pixel(_, colour) in pixels {
-                self.0 = self.0.wrapping_add(u32::from(colour.into_storage()));
-            }
-            Ok(())
-        }
-    }
-}
-
 /// An error as text for people.
 #[cfg(feature = "texts")]
 fn tell(error: &dyn core::fmt::Display) {
-    struct Length(usize);
-    impl core::fmt::Write for Length {
-        fn write_str(&mut self, text: &str) -> core::fmt::Result {
-            self.0 = self.0.wrapping_add(black_box(text).len());
-            Ok(())
-        }
-    }
-    let mut length = Length(0);
-    let _ = core::fmt::Write::write_fmt(&mut length, format_args!("{error}"));
-    black_box(length.0);
+    let mut sum = sum::Sum(0);
+    let written = core::fmt::Write::write_fmt(&mut sum, format_args!("{error}"));
+    black_box((written.is_ok(), sum.0));
 }
 
 fn draw(player: &mut Player<'_, Texels>, y: u32, row: &mut [u16]) {
@@ -110,7 +77,7 @@ fn play(memory: &mut [u8], row: &mut [u16]) {
         #[cfg(feature = "image")]
         {
             use embedded_graphics_core::image::ImageDrawable;
-            let mut sum = display::Sum(0);
+            let mut sum = sum::Sum(0);
             let Ok(()) = player.image(row).draw(&mut sum);
             black_box(sum.0);
         }

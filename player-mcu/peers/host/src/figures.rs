@@ -2,6 +2,7 @@
 
 use crate::qemu::Played;
 use crate::screen::PIXELS;
+use crate::table;
 use anyhow::{Context, Result, ensure};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -89,11 +90,8 @@ const END: &str = "<!-- end of peers -->";
 /// Puts the table between the marks in `readme`: a row for each player, the cheapest first.
 ///
 /// # Errors
-/// A file that cannot be read or written, or has no marks.
+/// Those of [`table::put`].
 pub fn write_table(readme: &Path, results: &Results) -> Result<()> {
-    let text = fs::read_to_string(readme).with_context(|| readme.display().to_string())?;
-    let (before, rest) = text.split_once(BEGIN).with_context(|| format!("{}: no line {BEGIN}", readme.display()))?;
-    let (_, after) = rest.split_once(END).with_context(|| format!("{}: no line {END}", readme.display()))?;
     let mut rows: BTreeMap<&str, Vec<&Figures>> = BTreeMap::new();
     results.values().flatten().for_each(|(player, figures)| rows.entry(player).or_default().push(figures));
     let mut rows: Vec<Vec<&Figures>> = rows.into_values().collect();
@@ -116,5 +114,5 @@ pub fn write_table(readme: &Path, results: &Results) -> Result<()> {
             row[0].content_bytes_per_frame,
         );
     }
-    fs::write(readme, format!("{before}{BEGIN}\n{table}\n{END}{after}")).with_context(|| readme.display().to_string())
+    table::put(readme, [BEGIN, END], &table)
 }

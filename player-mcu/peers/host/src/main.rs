@@ -9,6 +9,8 @@ mod figures;
 mod make;
 mod qemu;
 mod screen;
+#[path = "../../../bench/src/table.rs"]
+mod table;
 #[path = "../../src/warp.rs"]
 mod warp;
 
