@@ -97,6 +97,18 @@ pub enum Coverage {
     Field,
 }
 
+/// Whether keys are coded coarser than their settings say.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sparing {
+    /// They are not.
+    #[default]
+    Nothing,
+    /// Where it hardly shows.
+    Unseen,
+    /// As far as it takes for the bundle to have at most this many bytes.
+    Within(u64),
+}
+
 /// What may be chosen about a bundle.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
@@ -114,8 +126,8 @@ pub struct Settings {
     pub atlas: atlas::Settings,
     /// The keys.
     pub coding: CodingSettings,
-    /// Keys are coded coarser than that where it hardly shows.
-    pub spare: bool,
+    /// Whether keys are coded coarser than that.
+    pub sparing: Sparing,
     /// A label seen in fewer pixels of a cell and interval is left out of it; a torn part of one in fewer than twice as many.
     pub least_pixels: u32,
     /// Wrong pixels that a field has to save in a cell and interval to be used.
@@ -134,7 +146,7 @@ impl Default for Settings {
             space: SPACE_CUBIC,
             atlas: atlas::Settings::default(),
             coding: CodingSettings { step_log2: 0, lambda: 0.01, independent_every: 16 },
-            spare: false,
+            sparing: Sparing::Nothing,
             least_pixels: 8,
             field_price: 4,
             coverage: Coverage::All,
@@ -277,10 +289,10 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
         Content { grid: &grid, image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields, planes: &planes, cameras: &cameras };
     let code =
         |lambda| -> Result<Vec<u8>, BakeError> { Ok(encode::bundle(&content, CodingSettings { lambda, ..settings.coding }, header)?) };
-    let bundle = if settings.spare {
-        spare::spare(&flat.atlas, encode::image_bytes(image, settings.atlas.storage), code)?
-    } else {
-        code(settings.coding.lambda)?
+    let bundle = match settings.sparing {
+        Sparing::Nothing => code(settings.coding.lambda)?,
+        Sparing::Unseen => spare::unseen(&flat.atlas, encode::image_bytes(image, settings.atlas.storage), code)?,
+        Sparing::Within(bytes) => spare::within(bytes, code)?,
     };
     progress("coding keys", 1.0);
     Ok(Encoded { bundle, grid, dropped_pixels: sheets.dropped, torn_by_cause, seconds: start.elapsed().as_secs_f64() })

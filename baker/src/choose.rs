@@ -2,7 +2,7 @@
 //! Scenes and settings come from `job`, which bakes what is chosen; the report and the bundle say why.
 
 use crate::atlas::{self, Storage};
-use crate::bake::{self, BakeError, Flat, Progress, Settings};
+use crate::bake::{self, BakeError, Flat, Progress, Settings, Sparing};
 use crate::chart::{self, Choice, Family, Trial};
 use crate::gbuffer::Hits;
 use crate::job::something_seen;
@@ -87,7 +87,7 @@ fn halved(scene: &Scene, settings: &Settings) -> (Scene, Settings) {
     if play.width.min(play.height) >= SMALL {
         (play.width, play.height) = (play.width / 2, play.height / 2);
     }
-    (settings.atlas.storage, settings.spare) = (Storage::Packed, false);
+    (settings.atlas.storage, settings.sparing) = (Storage::Packed, Sparing::Nothing);
     (small, settings)
 }
 

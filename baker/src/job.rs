@@ -2,7 +2,7 @@
 //! The stages are `bake`'s, the search is `tune`'s, the figures are `verify`'s.
 
 use crate::atlas::{self, Storage};
-use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings};
+use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings, Sparing};
 use crate::chart::{self, Choice, Family};
 use crate::choose;
 use crate::finer::{self, Made};
@@ -103,7 +103,8 @@ impl Options {
         settings.coding.independent_every = self.independent_every;
         settings.coding.lambda = self.lambda.unwrap_or(settings.coding.lambda);
         // The other searches look for what a bit is worth themselves.
-        settings.spare = self.lambda.is_none() && matches!(self.goal, Goal::AsSet | Goal::Ram(_));
+        let spares = self.lambda.is_none() && matches!(self.goal, Goal::AsSet | Goal::Ram(_));
+        settings.sparing = if spares { Sparing::Unseen } else { Sparing::Nothing };
         settings.cell = self.cell.unwrap_or(if width > WIDE { 16 } else { settings.cell });
         settings.key_interval = self.key_interval.unwrap_or(settings.key_interval);
         settings.time = self.time.unwrap_or(settings.time);

@@ -9,6 +9,7 @@ pub mod camera;
 pub mod causes;
 pub mod chart;
 pub mod choose;
+mod climb;
 mod cuts;
 pub mod encode;
 pub mod fields;

@@ -5,16 +5,23 @@
 //! straight, and fewer layers in either where cells are larger. What each of these loses differs from scene to scene: it is measured.
 
 use crate::bake::{BakeError, Encoded, Flat, Settings};
+use crate::climb::{Free, climb};
+use crate::encode::image_bytes;
 use crate::inspect::{space_name, time_name};
 use crate::job::Chosen;
+use crate::metrics;
 use crate::report::grouped;
-use crate::tune::{Search, possible};
+use crate::tune::{Search, memory_needed, possible};
 use crate::verify;
 use cubist_core::format::{Envelope, PATH, Path, SPACE_LINEAR, TIME_LINEAR};
 use cubist_core::{Bundle, checksum};
 
 /// Cells tried, pixels, from the one asked for on.
 const CELLS: [u32; 4] = [4, 8, 16, 32];
+/// Steps tried from the best of what was tried at first.
+const STEPS: usize = 10;
+/// What twice the bytes of the keys have to bring, dB: a third of what sparing asks, since quality within the memory is what is wanted.
+const DOUBLE: f64 = 0.5;
 
 /// A bundle that was made, and what its player needs.
 struct Tried {
@@ -23,11 +30,20 @@ struct Tried {
     memory: usize,
 }
 
+/// What a bundle is good for.
+#[derive(Clone, Copy)]
+struct Value {
+    /// Mean PSNR against exact rays, dB.
+    psnr: f64,
+    /// That less what its keys take, dB: of two that fit the one worth more is taken.
+    worth: f64,
+}
+
 /// What was found on the way.
 #[derive(Default)]
 struct Found {
-    /// The best that fits, with its mean PSNR against exact rays, dB.
-    best: Option<(f64, Tried)>,
+    /// The best that fits.
+    best: Option<(Value, Tried)>,
     /// Time and space of all that fit.
     fitting: Vec<[u8; 2]>,
     /// The least memory that a bundle was measured to need.
@@ -42,8 +58,8 @@ impl Search<'_> {
     /// The best bundle that plays in `room` bytes of working memory.
     ///
     /// What is asked for is taken as it is where it fits. Else straight time, straight space and larger cells are tried, each as far as
-    /// the user left it open, and the best that fits is taken. Shorter intervals, whose cells see fewer labels, take more bytes: they are the
-    /// last resort.
+    /// the user left it open, and shorter intervals, whose cells see fewer labels, where none of that fits; from the one worth most of those that
+    /// do, steps lead on: closer keys may well make up for what had to go.
     ///
     /// # Errors
     /// [`BakeError::Ram`] where nothing fits; whatever flattening and encoding say.
@@ -56,7 +72,7 @@ impl Search<'_> {
             return Ok(Chosen { flat, encoded: fits.encoded, settings: fits.settings, search_seconds: 0.0, warnings: Vec::new() });
         }
         let whole = match &first {
-            Some(first) => Some((first.memory, quality(&flat, first)?)),
+            Some(first) => Some((first.memory, value(&flat, first)?.psnr)),
             None => None,
         };
         let shorter = (self.options.key_interval.is_none() && asked.key_interval > 1).then_some(asked.key_interval / 2);
@@ -85,7 +101,11 @@ impl Search<'_> {
         {
             found.consider(&flat, tried)?;
         }
-        let Some((psnr, tried)) = found.best else {
+        if let Some((value, tried)) = &found.best {
+            let start = (tried.settings, value.worth);
+            self.refine(&flat, start, room, &mut found)?;
+        }
+        let Some((Value { psnr, .. }, tried)) = found.best else {
             return Err(match found.smallest {
                 Some(smallest) => BakeError::Ram { asked: room, smallest, held: self.options.held(false) },
                 // Not a single bundle: what was in the way is the answer.
@@ -124,10 +144,31 @@ impl Search<'_> {
         Ok(())
     }
 
+    /// Steps from `start`, which fits, to what is worth more and fits too.
+    fn refine(&self, flat: &Flat, start: (Settings, f64), room: usize, found: &mut Found) -> Result<(), BakeError> {
+        let options = self.options;
+        let free = Free {
+            cell: options.cell.is_none(),
+            interval: options.key_interval.is_none(),
+            lambda: false,
+            time: options.time.is_none(),
+            space: options.space.is_none(),
+            frames: self.scene.playback.frames,
+        };
+        let mut step = 0;
+        climb(start, &free, STEPS, |settings| {
+            self.say(step, STEPS);
+            step += 1;
+            let Some(tried) = self.attempt(flat, *settings, found)?.filter(|tried| tried.memory <= room) else { return Ok(None) };
+            found.consider(flat, tried).map(|value| Some(value.worth))
+        })?;
+        Ok(())
+    }
+
     /// Makes a bundle; `None` where no bundle can hold it.
     fn attempt(&self, flat: &Flat, settings: Settings, found: &mut Found) -> Result<Option<Tried>, BakeError> {
         let Some(encoded) = possible(self.encode(flat, &settings), &mut found.exceeded)? else { return Ok(None) };
-        let memory = Bundle::parse(&encoded.bundle).map_err(verify::VerifyError::from)?.memory_needed();
+        let memory = memory_needed(&encoded.bundle)?;
         found.smallest = Some(found.smallest.map_or(memory, |smallest| smallest.min(memory)));
         Ok(Some(Tried { settings, encoded, memory }))
     }
@@ -135,19 +176,22 @@ impl Search<'_> {
 
 impl Found {
     /// Makes `tried`, which fits, the best if it is.
-    fn consider(&mut self, flat: &Flat, tried: Tried) -> Result<(), BakeError> {
+    fn consider(&mut self, flat: &Flat, tried: Tried) -> Result<Value, BakeError> {
         self.fitting.push([tried.settings.time, tried.settings.space]);
-        let psnr = quality(flat, &tried)?;
-        if self.best.as_ref().is_none_or(|(most, _)| psnr > *most) {
-            self.best = Some((psnr, tried));
+        let value = value(flat, &tried)?;
+        if self.best.as_ref().is_none_or(|(best, _)| value.worth > best.worth) {
+            self.best = Some((value, tried));
         }
-        Ok(())
+        Ok(value)
     }
 }
 
-/// Mean PSNR against exact rays, dB.
-fn quality(flat: &Flat, tried: &Tried) -> Result<f64, BakeError> {
-    Ok(verify::against_exact(&tried.encoded.bundle, &flat.atlas, &|_, _| {})?.psnr_mean)
+/// What `tried` is good for.
+fn value(flat: &Flat, tried: &Tried) -> Result<Value, BakeError> {
+    let psnr = verify::against_exact(&tried.encoded.bundle, &flat.atlas, &|_, _| {})?.psnr_mean;
+    let picture = image_bytes(&flat.atlas.image, tried.settings.atlas.storage);
+    let keys = tried.encoded.bundle.len().saturating_sub(picture) as u64;
+    Ok(Value { psnr, worth: metrics::worth(psnr, keys, DOUBLE) })
 }
 
 /// The memory that a player of `bundle` would need if its time and its space were others, with the same layers; `None` if that is no bundle.

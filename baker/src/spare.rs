@@ -1,7 +1,9 @@
-//! Sparing: keys coded as coarsely as the picture lets pass. Where positions bend more than a grid can follow, bits that place it finely show nothing.
+//! Sparing: keys coded as coarsely as the picture lets pass, or as a number of bytes asks for. Where positions bend more than a grid can follow, bits
+//! that place it finely show nothing.
 //! `bake` hands in how to code; the bundle of the best coarseness goes back.
 
 use crate::atlas::Atlas;
+use crate::climb::LAMBDAS;
 use crate::metrics;
 use crate::truth::spread;
 use crate::verify::{self, VerifyError};
@@ -19,7 +21,7 @@ pub(crate) const DOUBLE: f64 = 1.5;
 ///
 /// # Errors
 /// Those of `code`, and [`VerifyError`] where the player refuses a bundle.
-pub(crate) fn spare<E: From<VerifyError>>(atlas: &Atlas, picture: usize, code: impl Fn(f32) -> Result<Vec<u8>, E>) -> Result<Vec<u8>, E> {
+pub(crate) fn unseen<E: From<VerifyError>>(atlas: &Atlas, picture: usize, code: impl Fn(f32) -> Result<Vec<u8>, E>) -> Result<Vec<u8>, E> {
     let frames = spread(atlas.gbuffer.frames, COMPARED);
     let exact: Vec<Vec<u8>> = frames.iter().map(|&frame| verify::exact_frame(atlas, frame)).collect();
     let measured = |lambda| -> Result<(f64, Vec<u8>), E> {
@@ -40,4 +42,39 @@ pub(crate) fn spare<E: From<VerifyError>>(atlas: &Atlas, picture: usize, code: i
         best = next;
     }
     Ok(best.1)
+}
+
+/// The finest bundle among those that `code` makes, at what a bit is worth, that has at most so many `bytes`, within half a rung of the ladder that
+/// searches climb; the coarsest where none has.
+///
+/// # Errors
+/// Those of `code`.
+pub(crate) fn within<E>(bytes: u64, code: impl Fn(f32) -> Result<Vec<u8>, E>) -> Result<Vec<u8>, E> {
+    let fits = |bundle: &[u8]| bundle.len() as u64 <= bytes;
+    let mut bundle = code(LAMBDAS[0])?;
+    for pair in LAMBDAS.windows(2) {
+        if fits(&bundle) {
+            break;
+        }
+        bundle = code(pair[1])?;
+        if fits(&bundle) {
+            let between = code(libm::sqrtf(pair[0] * pair[1]))?;
+            bundle = if fits(&between) { between } else { bundle };
+        }
+    }
+    Ok(bundle)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_fits_is_as_fine_as_can_be() {
+        // 1,000 bytes and less the more a bit is worth, by thousandths.
+        let code = |lambda: f32| Ok::<_, VerifyError>(vec![0; 1000 - (500.0 * lambda) as usize]);
+        let bytes = [1000, 999, 990, 900, 600, 500, 10];
+        let lengths = bytes.map(|bytes| within(bytes, code).unwrap().len());
+        assert_eq!(lengths, [995, 995, 985, 850, 500, 500, 500]);
+    }
 }

@@ -3,7 +3,8 @@
 //! and measured. What is tried, and in which order, depends on nothing but the scene and the options.
 
 use crate::atlas::{self, Storage};
-use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings};
+use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings, Sparing};
+use crate::climb::{Free, climb};
 use crate::encode::{self, image_bytes};
 use crate::gbuffer::Hits;
 use crate::job::{self, Chosen, Goal, Options};
@@ -11,27 +12,28 @@ use crate::report::grouped;
 use crate::samples::Samples;
 use crate::scene::Scene;
 use crate::trace::Tracer;
-use crate::verify;
+use crate::verify::{self, VerifyError};
+use cubist_core::Bundle;
 use std::time::Instant;
 
-/// Cells tried, pixels.
+/// Cells tried at first, pixels.
 const CELLS: [u32; 2] = [16, 8];
-/// Cells tried when the others do not reach a quality: they take four times the memory.
-const FINE_CELLS: [u32; 1] = [4];
-/// Key intervals tried, frames.
+/// Key intervals tried at first, frames.
 const INTERVALS: [u32; 4] = [32, 16, 8, 4];
-/// What a bit is worth, coarsest first, in the search for a budget.
-const BUDGET_LAMBDAS: [f32; 2] = [0.3, 0.05];
-/// What a bit is worth, coarsest first, in the search for a quality, once the grid is found.
-const QUALITY_LAMBDAS: [f32; 3] = [1.0, 0.3, 0.1];
-/// What a bit is worth when a quality is just missed.
-const FINEST_LAMBDA: f32 = 0.01;
+/// What a bit is worth at first in the search for a budget.
+const BUDGET_LAMBDA: f32 = 0.1;
 /// Densities of the source image tried, of the one asked for.
 const DENSITIES: [f64; 9] = [1.0, 0.85, 0.7, 0.6, 0.5, 0.35, 0.25, 0.18, 0.125];
-/// Bundles that fit the budget and are measured.
-const TRIES: usize = 6;
-/// How far a predicted size may lie over the budget and still be tried.
-const SLACK: f64 = 1.05;
+/// Bundles that fit the budget and are measured, before the best of them is bettered step by step.
+const TRIES: usize = 4;
+/// Steps tried from the best of what was tried at first.
+const STEPS: usize = 18;
+/// The score of a bundle of no bytes that reaches the quality asked for; no quality in dB is half as high, nor is a bundle half as large.
+const REACHED: f64 = 1e12;
+/// Bytes of working memory that a player may need without having been told: half of an RP2040's. More only where the first tries take it too.
+const MOST_MEMORY: usize = 128 << 10;
+/// How far a predicted size may lie over the budget and still be tried: coarser keys take less.
+const SLACK: f64 = 1.15;
 
 /// Searches for `goal`.
 ///
@@ -128,9 +130,9 @@ impl Search<'_> {
     }
 
     /// The grids to try, the coarsest first.
-    fn grids(&self, source: atlas::Settings, cells: &[u32]) -> Vec<Settings> {
+    fn grids(&self, source: atlas::Settings) -> Vec<Settings> {
         let base = Settings { atlas: source, ..self.options.settings(self.scene.playback.width) };
-        let cells = self.options.cell.map_or(cells.to_vec(), |cell| vec![cell]);
+        let cells = self.options.cell.map_or(CELLS.to_vec(), |cell| vec![cell]);
         let shorter: Vec<u32> = INTERVALS.into_iter().filter(|&interval| interval < self.scene.playback.frames).collect();
         let intervals = match self.options.key_interval {
             Some(interval) => vec![interval],
@@ -150,7 +152,7 @@ impl Search<'_> {
     ///
     /// Source images and grids are measured apart, then the sums of their bytes and of their errors say which pairs to bake.
     fn budget(&self, budget: u64) -> Result<Chosen, BakeError> {
-        let steps = DENSITIES.len() + INTERVALS.len() * CELLS.len() * BUDGET_LAMBDAS.len() + TRIES;
+        let steps = DENSITIES.len() + INTERVALS.len() * CELLS.len() + TRIES + STEPS;
         let samples = Samples::new(self.scene);
         let room = usize::try_from(budget).unwrap_or(usize::MAX);
         let mut images: Vec<Image> = Vec::new();
@@ -194,24 +196,40 @@ impl Search<'_> {
         let asked = self.options.source();
         let (image_bytes, image_error) = (image_bytes(&flat.atlas.image, asked.storage), samples.of_image(&flat.atlas));
         let (mut keys, mut exceeded) = (Vec::new(), None);
-        for grid in self.grids(asked, &CELLS) {
-            for lambda in BUDGET_LAMBDAS {
-                self.say(DENSITIES.len() + keys.len(), steps);
-                let mut settings = grid;
-                settings.coding.lambda = lambda;
-                let Some(Encoded { bundle, .. }) = possible(self.encode(flat, &settings), &mut exceeded)? else { continue };
-                let (error, _) = samples.of_bundle(&bundle)?;
-                keys.push(Keys { settings, bytes: bundle.len().saturating_sub(image_bytes), error: (error - image_error).max(0.0) });
-            }
+        for mut settings in self.grids(asked) {
+            self.say(DENSITIES.len() + keys.len(), steps);
+            settings.coding.lambda = BUDGET_LAMBDA;
+            let Some(Encoded { bundle, .. }) = possible(self.encode(flat, &settings), &mut exceeded)? else { continue };
+            let (error, _) = samples.of_bundle(&bundle)?;
+            keys.push(Keys { settings, bytes: bundle.len().saturating_sub(image_bytes), error: (error - image_error).max(0.0) });
         }
         exceeded.filter(|_| keys.is_empty()).map_or(Ok(keys), Err)
     }
 
-    /// Bakes the pairs that promise most until enough of them fit, and keeps the best.
+    /// What the steps may change that refine a search's choice, what a bit is worth being one of them or not.
+    fn free(&self, lambda: bool) -> Free {
+        let Options { cell, key_interval, .. } = *self.options;
+        let frames = self.scene.playback.frames;
+        Free { cell: cell.is_none(), interval: key_interval.is_none(), lambda, time: false, space: false, frames }
+    }
+
+    /// Bakes the pairs that promise most until enough of them fit, and steps on from the best.
     fn best_pair(&self, budget: u64, pairs: &[(&Image, &Keys)], samples: &Samples, steps: usize) -> Result<Chosen, BakeError> {
         let mut current: Option<(f64, Flat)> = None;
-        let (mut best, mut exceeded): (Option<(f64, Settings)>, _) = (None, None);
-        let (mut fitting, mut smallest) = (0, u64::MAX);
+        let mut exceeded = None;
+        let mut best: Option<(Settings, f64)> = None;
+        let (mut fitting, mut smallest, mut room) = (0, u64::MAX, MOST_MEMORY);
+        // Of bundles that fit the better one counts, of those that do not the smaller one: from there steps may lead to one that does.
+        let mut score = |flat: &Flat, settings: &Settings, first: bool| -> Result<Option<f64>, BakeError> {
+            let Some(Encoded { bundle, .. }) = possible(self.encode(flat, settings), &mut exceeded)? else { return Ok(None) };
+            let (bytes, memory) = (bundle.len() as u64, memory_needed(&bundle)?);
+            smallest = smallest.min(bytes);
+            if bytes > budget {
+                return Ok(Some(-(bytes as f64)));
+            }
+            room = if first { room.max(memory) } else { room };
+            Ok(if memory <= room { Some(samples.of_bundle(&bundle)?.1) } else { None })
+        };
         // Where nothing is predicted to fit, the smallest prediction is tried all the same.
         let least = pairs.iter().map(|(image, keys)| image.with(keys, budget).0).min().unwrap_or(0);
         for (image, keys) in pairs {
@@ -219,31 +237,34 @@ impl Search<'_> {
             if fitting == TRIES || (predicted as f64 > budget as f64 * SLACK && predicted > least) {
                 continue;
             }
-            self.say(steps - TRIES + fitting, steps);
+            self.say(steps - STEPS - TRIES + fitting, steps);
             let flat = match current.take() {
                 Some((density, flat)) if density == image.source.density => flat,
                 _ => self.flat(image.source)?,
             };
-            let settings = Settings { atlas: source, ..keys.settings };
-            let encoded = possible(self.encode(&flat, &settings), &mut exceeded)?;
+            let settings = Settings { atlas: source, sparing: Sparing::Within(budget), ..keys.settings };
+            let found = score(&flat, &settings, true)?;
             current = Some((image.source.density, flat));
-            let Some(Encoded { bundle, .. }) = encoded else { continue };
-            smallest = smallest.min(bundle.len() as u64);
-            if bundle.len() as u64 <= budget {
-                fitting += 1;
-                let (_, psnr) = samples.of_bundle(&bundle)?;
-                if best.is_none_or(|(most, _)| psnr > most) {
-                    best = Some((psnr, settings));
-                }
+            let Some(found) = found else { continue };
+            fitting += usize::from(found > 0.0);
+            if best.is_none_or(|(_, most)| found > most) {
+                best = Some((settings, found));
             }
         }
-        let Some((_, settings)) = best else {
-            return Err(exceeded.filter(|_| smallest == u64::MAX).unwrap_or(BakeError::Budget { budget, smallest }));
-        };
+        let Some(start) = best else { return Err(exceeded.unwrap_or(BakeError::Budget { budget, smallest })) };
         let flat = match current {
-            Some((density, flat)) if density == settings.atlas.density => flat,
-            _ => self.flat(settings.atlas)?,
+            Some((density, flat)) if density == start.0.atlas.density => flat,
+            _ => self.flat(start.0.atlas)?,
         };
+        let mut step = steps - STEPS;
+        let (settings, found) = climb(start, &self.free(false), STEPS, |settings| {
+            self.say(step, steps);
+            step += 1;
+            score(&flat, settings, false)
+        })?;
+        if found < 0.0 {
+            return Err(BakeError::Budget { budget, smallest });
+        }
         let packed = (settings.atlas.storage != self.options.source().storage).then(|| {
             let image = &flat.atlas.image;
             format!(
@@ -257,24 +278,47 @@ impl Search<'_> {
 
     /// The smallest bundle whose mean PSNR against exact rays reaches `asked`.
     fn psnr(&self, asked: f64) -> Result<Chosen, BakeError> {
-        let mut nearest = 0.0f64;
         let mut source = self.options.source();
-        let steps = CELLS.len() * INTERVALS.len() + QUALITY_LAMBDAS.len();
-        for (step, ratio) in DENSITIES.into_iter().enumerate() {
-            if step > 0 && ratio > 0.8 {
-                continue;
+        let steps = CELLS.len() * INTERVALS.len() + STEPS;
+        let (mut step, mut nearest, mut room, mut exceeded) = (0, 0.0f64, MOST_MEMORY, None);
+        // Of bundles that reach it the smaller one counts, of those that do not the better one.
+        let mut score = |flat: &Flat, settings: &Settings, first: bool| -> Result<Option<f64>, BakeError> {
+            self.say(step, steps);
+            step += 1;
+            let Some(Encoded { bundle, .. }) = possible(self.encode(flat, settings), &mut exceeded)? else { return Ok(None) };
+            let psnr = verify::against_exact(&bundle, &flat.atlas, &|_, _| {})?.psnr_mean;
+            let (reached, memory) = (psnr >= asked, memory_needed(&bundle)?);
+            // Memory is no matter until there is one that reaches it.
+            if first || (reached && nearest < asked) {
+                room = room.max(memory);
             }
+            nearest = nearest.max(psnr);
+            Ok((!reached || memory <= room).then(|| if reached { REACHED - bundle.len() as f64 } else { psnr }))
+        };
+        let mut best: Option<(Settings, f64)> = None;
+        for (turn, ratio) in DENSITIES.into_iter().enumerate().filter(|&(turn, ratio)| turn == 0 || ratio < 0.8) {
             let wanted = atlas::Settings { density: source.density * ratio, ..source };
             let flat = self.flat(wanted)?;
-            if step == 0 {
+            if turn == 0 {
                 source.density *= flat.atlas.figures.scale;
+                for settings in self.grids(wanted) {
+                    if let Some(found) = score(&flat, &settings, true)?
+                        && best.is_none_or(|(_, most)| found > most)
+                    {
+                        best = Some((settings, found));
+                    }
+                }
+            } else if let Some((settings, found)) = &mut best {
+                // With fewer texels a pixel, what came closest.
+                settings.atlas = wanted;
+                *found = score(&flat, settings, false)?.unwrap_or(0.0);
             }
-            let found = match self.smallest(&flat, wanted, &CELLS, asked, steps, &mut nearest)? {
-                None if self.options.cell.is_none() => self.smallest(&flat, wanted, &FINE_CELLS, asked, steps, &mut nearest)?,
-                found => found,
-            };
-            if let Some(settings) = found {
-                let coarser = (step > 0).then(|| {
+            let Some(start) = best else { continue };
+            let most = if turn == 0 || start.1 > REACHED / 2.0 { STEPS } else { 0 };
+            let (settings, found) = climb(start, &self.free(true), most, |settings| score(&flat, settings, false))?;
+            best = Some((settings, found));
+            if found > REACHED / 2.0 {
+                let coarser = (turn > 0).then(|| {
                     format!(
                         "--psnr {asked}: out of reach at a density of {:.2} texels a pixel: the source image has {:.2}, which shows less detail",
                         source.density, wanted.density
@@ -283,55 +327,14 @@ impl Search<'_> {
                 return self.finish(flat, settings, coarser.into_iter().collect());
             }
         }
-        Err(BakeError::Psnr { asked, nearest, held: self.options.held(true) })
+        // Not a single bundle: what was in the way is the answer.
+        Err(exceeded.filter(|_| best.is_none()).unwrap_or(BakeError::Psnr { asked, nearest, held: self.options.held(true) }))
     }
+}
 
-    /// The settings of the smallest bundle that reaches `asked` at one source image; `nearest` is raised to what is reached.
-    fn smallest(
-        &self,
-        flat: &Flat,
-        source: atlas::Settings,
-        cells: &[u32],
-        asked: f64,
-        steps: usize,
-        nearest: &mut f64,
-    ) -> Result<Option<Settings>, BakeError> {
-        let mut exceeded = None;
-        let mut measure = |settings: &Settings| -> Result<Option<(usize, f64)>, BakeError> {
-            let Some(Encoded { bundle, .. }) = possible(self.encode(flat, settings), &mut exceeded)? else { return Ok(None) };
-            let psnr = verify::against_exact(&bundle, &flat.atlas, &|_, _| {})?.psnr_mean;
-            *nearest = nearest.max(psnr);
-            Ok(Some((bundle.len(), psnr)))
-        };
-        let mut measured: Vec<(usize, f64, Settings)> = Vec::new();
-        for (step, settings) in self.grids(source, cells).into_iter().enumerate() {
-            self.say(step, steps);
-            if let Some((bytes, psnr)) = measure(&settings)? {
-                measured.push((bytes, psnr, settings));
-            }
-        }
-        let reaching = measured.iter().filter(|(_, psnr, _)| *psnr >= asked).min_by_key(|(bytes, ..)| *bytes);
-        let Some(&(bytes, _, grid)) = reaching else {
-            // Just missed: the grid that comes closest, without any saving on ghosts and with all bits of the coordinates.
-            let Some(&(.., mut grid)) = measured.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else {
-                // Not a single bundle: what was in the way is the answer, unless coarser cells have had theirs.
-                return exceeded.filter(|_| *nearest == 0.0).map_or(Ok(None), Err);
-            };
-            (grid.coding.lambda, grid.coding.step_log2) = (FINEST_LAMBDA, 0);
-            return Ok(measure(&grid)?.filter(|&(_, psnr)| psnr >= asked).map(|_| grid));
-        };
-        let mut best = (bytes, grid);
-        for (step, lambda) in QUALITY_LAMBDAS.into_iter().enumerate() {
-            self.say(CELLS.len() * INTERVALS.len() + step, steps);
-            let mut settings = grid;
-            settings.coding.lambda = lambda;
-            let Some((bytes, psnr)) = measure(&settings)? else { continue };
-            if psnr >= asked && bytes < best.0 {
-                best = (bytes, settings);
-            }
-        }
-        Ok(Some(best.1))
-    }
+/// Bytes of working memory that a player of `bundle` needs.
+pub(crate) fn memory_needed(bundle: &[u8]) -> Result<usize, BakeError> {
+    Ok(Bundle::parse(bundle).map_err(VerifyError::from)?.memory_needed())
 }
 
 /// What came of an attempt; `None` where a bundle cannot hold it: that ends the attempt, not the search. The first to exceed
@@ -411,7 +414,14 @@ mod tests {
         let (plain, report) = bake_scene(&scene, &Options::default(), &|_, _| {}).unwrap();
         let reached = report.quality.psnr_mean;
         let (bytes, report) = bake(reached - 1.0).unwrap();
-        assert!(report.quality.psnr_mean >= reached - 1.0 && bytes.len() <= plain.len());
+        assert!(
+            report.quality.psnr_mean >= reached - 1.0 && bytes.len() <= plain.len(),
+            "{reached} {} dB, {} {} bytes, {:?}",
+            report.quality.psnr_mean,
+            plain.len(),
+            bytes.len(),
+            report.grid
+        );
         let Err(error @ BakeError::Psnr { nearest, .. }) = bake(98.0) else { panic!("98 dB are out of reach") };
         assert!(nearest > reached && error.to_string().contains(&format!("{nearest:.2}")), "{error}");
         // What was not given is not to blame.
