@@ -1,5 +1,5 @@
-//! Climbing: from one way to code keys to a better one, a step at a time, for as long as a step helps. `tune` and `ram` hand in where to start, what
-//! may change and what a bundle is worth to them; which steps are tried, and in which order, depends on nothing else.
+//! Climbing: from one way to code keys to a better one, a step at a time, for as long as a step helps. `tune`, `ram` and `finer` hand in where to
+//! start, what may change and what a bundle is worth to them; which steps are tried, and in which order, depends on nothing else.
 
 use crate::bake::{BakeError, Settings};
 use cubist_core::format::{SPACE_CUBIC, SPACE_LINEAR, TIME_CUBIC, TIME_LINEAR};
@@ -8,6 +8,8 @@ use cubist_core::format::{SPACE_CUBIC, SPACE_LINEAR, TIME_CUBIC, TIME_LINEAR};
 const CELLS: [u32; 4] = [4, 8, 16, 32];
 const INTERVALS: [u32; 14] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 24, 32, 48, 64];
 pub(crate) const LAMBDAS: [f32; 5] = [0.01, 0.03, 0.1, 0.3, 1.0];
+/// The longest interval between keys, frames.
+const LONGEST: u32 = 256;
 /// What a step has to bring to be taken, in whatever the score counts.
 const GAIN: f64 = 0.01;
 
@@ -24,8 +26,8 @@ pub(crate) struct Free {
 }
 
 /// One way to change settings: by how many rungs each. `scale`: the key interval is doubled or halved that many times.
-#[derive(Clone, Copy, Default)]
-struct Step {
+#[derive(Clone, Copy)]
+pub(crate) struct Step {
     cell: i32,
     scale: i32,
     interval: i32,
@@ -34,25 +36,43 @@ struct Step {
     space: bool,
 }
 
-/// All steps, those that mostly help first.
-fn steps() -> impl Iterator<Item = Step> {
-    let none = Step::default();
-    [
-        Step { interval: -1, ..none },
-        Step { lambda: 1, ..none },
-        Step { interval: -1, lambda: 1, ..none },
-        Step { cell: -1, scale: 1, ..none },
-        Step { cell: 1, scale: -1, ..none },
-        Step { lambda: -1, ..none },
-        Step { interval: 1, ..none },
-        Step { interval: 1, lambda: -1, ..none },
-        Step { cell: -1, ..none },
-        Step { cell: 1, ..none },
-        Step { time: true, ..none },
-        Step { space: true, ..none },
-        Step { time: true, interval: -1, ..none },
-    ]
-    .into_iter()
+impl Step {
+    const NONE: Self = Self { cell: 0, scale: 0, interval: 0, lambda: 0, time: false, space: false };
+    /// Cells half or twice as large.
+    const SMALLER: Self = Self { cell: -1, ..Self::NONE };
+    const LARGER: Self = Self { cell: 1, ..Self::NONE };
+    /// Cells half as large with keys twice as far apart, and the other way round.
+    pub const FINER: Self = Self { scale: 1, ..Self::SMALLER };
+    pub const COARSER: Self = Self { scale: -1, ..Self::LARGER };
+    /// Keys twice as far apart, half as far.
+    pub const DOUBLE: Self = Self { scale: 1, ..Self::NONE };
+    pub const HALF: Self = Self { scale: -1, ..Self::NONE };
+    /// Keys a little closer, a little farther apart.
+    const CLOSER: Self = Self { interval: -1, ..Self::NONE };
+    const FARTHER: Self = Self { interval: 1, ..Self::NONE };
+    /// A bit worth more, less.
+    const DEARER: Self = Self { lambda: 1, ..Self::NONE };
+    const CHEAPER: Self = Self { lambda: -1, ..Self::NONE };
+    /// The other kind of time, of space.
+    const TIME: Self = Self { time: true, ..Self::NONE };
+    const SPACE: Self = Self { space: true, ..Self::NONE };
+
+    /// Those of a search that has time, those first that mostly help.
+    pub const ALL: [Self; 13] = [
+        Self::CLOSER,
+        Self::DEARER,
+        Self { lambda: 1, ..Self::CLOSER },
+        Self::FINER,
+        Self::COARSER,
+        Self::CHEAPER,
+        Self::FARTHER,
+        Self { lambda: -1, ..Self::FARTHER },
+        Self::SMALLER,
+        Self::LARGER,
+        Self::TIME,
+        Self::SPACE,
+        Self { time: true, ..Self::CLOSER },
+    ];
 }
 
 /// The rung `by` above `value`, which need not be on one; `None` past either end.
@@ -81,7 +101,7 @@ fn after(from: &Settings, step: Step, free: &Free) -> Option<Settings> {
     let mut to = *from;
     to.cell = rung(&CELLS, from.cell, step.cell)?;
     let scaled = if step.scale < 0 { from.key_interval >> -step.scale } else { from.key_interval << step.scale };
-    to.key_interval = rung(&INTERVALS, scaled, step.interval)?;
+    to.key_interval = rung(&INTERVALS, scaled, step.interval).filter(|&interval| (1..=LONGEST).contains(&interval))?;
     to.coding.lambda = rung(&LAMBDAS, from.coding.lambda, step.lambda)?;
     let other = |now: u8, [a, b]: [u8; 2]| if now == a { b } else { a };
     to.time = if step.time { other(from.time, [TIME_LINEAR, TIME_CUBIC]) } else { from.time };
@@ -95,7 +115,7 @@ fn name(settings: &Settings) -> (u32, u32, u32, u8, u8) {
     (settings.cell, settings.key_interval, settings.coding.lambda.to_bits(), settings.time, settings.space)
 }
 
-/// The best settings that steps from `start` lead to, with their score: each step that scores more is taken at once and tried again, and the
+/// The best settings that `steps` from `start` lead to, with their score: each step that scores more is taken at once and tried again, and the
 /// climb ends where none does or after `most` tries. `score` gives `None` for what cannot be had.
 ///
 /// # Errors
@@ -103,12 +123,13 @@ fn name(settings: &Settings) -> (u32, u32, u32, u8, u8) {
 pub(crate) fn climb(
     start: (Settings, f64),
     free: &Free,
+    steps: &[Step],
     most: usize,
     mut score: impl FnMut(&Settings) -> Result<Option<f64>, BakeError>,
 ) -> Result<(Settings, f64), BakeError> {
     let mut best = start;
     let mut seen = vec![name(&start.0)];
-    let mut order: Vec<Step> = steps().collect();
+    let mut order = steps.to_vec();
     'climbing: loop {
         for at in 0..order.len() {
             let Some(next) = after(&best.0, order[at], free) else { continue };
@@ -156,10 +177,10 @@ mod tests {
         };
         let start = Settings::default();
         let worth = height(&start).unwrap().unwrap();
-        let (top, best) = climb((start, worth), &ALL, 60, height).unwrap();
+        let (top, best) = climb((start, worth), &ALL, &Step::ALL, 60, height).unwrap();
         assert_eq!((name(&top), best > -1e-6), ((4, 3, 0.1f32.to_bits(), TIME_LINEAR, start.space), true));
         let held = Free { cell: false, time: false, ..ALL };
-        let (top, _) = climb((start, worth), &held, 60, height).unwrap();
+        let (top, _) = climb((start, worth), &held, &Step::ALL, 60, height).unwrap();
         assert_eq!(name(&top), (start.cell, 3, 0.1f32.to_bits(), start.time, start.space));
         // No more tries than allowed, and nothing where nothing is to be had.
         let mut tries = 0;
@@ -167,7 +188,7 @@ mod tests {
             tries += 1;
             Ok(None)
         };
-        let (same, _) = climb((start, worth), &ALL, 5, counted).unwrap();
+        let (same, _) = climb((start, worth), &ALL, &Step::ALL, 5, counted).unwrap();
         assert_eq!((name(&same), tries), (name(&start), 5));
     }
 
@@ -175,7 +196,7 @@ mod tests {
     fn intervals_stay_shorter_than_the_path() {
         let start = Settings { key_interval: 6, ..Settings::default() };
         let longest = |s: &Settings| Ok(Some(f64::from(s.key_interval)));
-        let (top, _) = climb((start, 6.0), &Free { frames: 13, cell: false, ..ALL }, 60, longest).unwrap();
+        let (top, _) = climb((start, 6.0), &Free { frames: 13, cell: false, ..ALL }, &Step::ALL, 60, longest).unwrap();
         assert_eq!(top.key_interval, 12);
     }
 }

@@ -1,8 +1,10 @@
 //! Cells and keys of another shape: where so many outlines cross a cell that sheets are given up in a good part of the picture, cells half as large
-//! with keys twice as far apart show more for the bytes; where outlines are few but positions bend on their way from key to key, as on rough land,
-//! cells twice as large with keys twice as close do, in less memory. A bundle baked as usual comes from `job`; the better of two goes back.
+//! with keys twice as far apart may show more for the bytes, or keys twice as far apart as much for fewer; where outlines are few but positions bend
+//! on their way from key to key, keys twice as close show more, and on rough land cells twice as large besides, in less memory. A bundle baked as
+//! usual comes from `job`; the best of a few goes back.
 
 use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings};
+use crate::climb::{Free, Step, climb};
 use crate::encode::image_bytes;
 use crate::metrics;
 use crate::report::grouped;
@@ -15,10 +17,8 @@ use cubist_core::Bundle;
 const TORN: f64 = 2.0;
 /// Texels that a pixel in a hundred is off by, from which on closer keys are worth a try. Most scenes have a half to three quarters of that.
 const BENT: f64 = 2.0;
-/// The smallest and the largest cells there are, pixels.
-const CELLS: [u32; 2] = [4, 32];
-/// The longest interval between keys, frames.
-const LONGEST: u32 = 256;
+/// Steps tried where positions bend, at most: fast turns want keys much closer.
+const BENT_TRIES: usize = 4;
 
 /// A bundle, what made it, and how good it is.
 pub(crate) struct Made {
@@ -33,54 +33,67 @@ impl Made {
         metrics::worth(self.quality.psnr_mean, self.encoded.bundle.len().saturating_sub(picture) as u64, DOUBLE)
     }
 
-    fn memory(&self) -> String {
-        Bundle::parse(&self.encoded.bundle).map(|bundle| grouped(bundle.memory_needed())).unwrap_or_default()
+    /// What it is in the words of a warning, `picture` being what its source image takes.
+    fn told(&self, picture: usize) -> String {
+        let Self { encoded: Encoded { bundle, .. }, quality, .. } = self;
+        let memory = Bundle::parse(bundle).map(|bundle| grouped(bundle.memory_needed())).unwrap_or_default();
+        format!("{:.1} dB in {} B of keys and {memory} B of memory", quality.psnr_mean, grouped(bundle.len().saturating_sub(picture)))
     }
 }
 
-/// The cells and the interval worth a try after `settings` gave `quality`, and why.
-fn other(settings: &Settings, quality: &Quality) -> Option<(Settings, &'static str)> {
-    let Settings { cell, key_interval, .. } = *settings;
-    let [smallest, largest] = CELLS;
-    let (torn, bent) = (quality.wrong_surface_percent >= TORN, quality.path_error_texels.p99 >= BENT);
-    if torn && cell / 2 >= smallest && key_interval * 2 <= LONGEST {
-        Some((Settings { cell: cell / 2, key_interval: key_interval * 2, ..*settings }, "many outlines cross every cell"))
-    } else if !torn && bent && cell * 2 <= largest && key_interval >= 2 {
-        Some((
-            Settings { cell: cell * 2, key_interval: key_interval / 2, ..*settings },
-            "surfaces bend between keys more than between cells",
-        ))
+/// Steps to climb by, and how many tries they get.
+type Climb = (&'static [Step], usize);
+
+/// The climbs worth a try after settings gave `quality`, the second one if the first leads nowhere; and why.
+fn climbs(quality: &Quality) -> Option<(&'static [Climb], &'static str)> {
+    if quality.wrong_surface_percent >= TORN {
+        // Smaller cells are there for the picture: keys still farther apart would take that back.
+        Some((&[(&[Step::FINER], 1), (&[Step::DOUBLE], 1)], "many outlines cross every cell"))
+    } else if quality.path_error_texels.p99 >= BENT {
+        Some((&[(&[Step::COARSER, Step::HALF], BENT_TRIES)], "surfaces bend on their way from key to key"))
     } else {
         None
     }
 }
 
-/// `usual`, or a bundle of smaller or larger cells if that is worth more, as sparing counts it; and then what the user should know about it.
+/// `usual`, or a bundle of other cells or intervals if that is worth more, as sparing counts it; and then what the user should know about it.
 ///
 /// # Errors
 /// Those of encoding, and of the player.
 pub(crate) fn choose(scene: &Scene, flat: &Flat, usual: Made, progress: Progress<'_>) -> Result<(Made, Option<String>), BakeError> {
-    let Some((settings, why)) = other(&usual.settings, &usual.quality) else { return Ok((usual, None)) };
-    progress("trying other cells", 0.0);
-    let encoded = bake::encode(scene, flat, &settings, &|_, _| {})?;
-    let quality = verify::against_exact(&encoded.bundle, &flat.atlas, &|_, _| {})?;
-    let tried = Made { settings, encoded, quality };
-    let picture = image_bytes(&flat.atlas.image, settings.atlas.storage);
-    if tried.worth(picture) <= usual.worth(picture) {
-        return Ok((usual, None));
+    let Some((climbs, why)) = climbs(&usual.quality) else { return Ok((usual, None)) };
+    let picture = image_bytes(&flat.atlas.image, usual.settings.atlas.storage);
+    let free = Free { cell: true, interval: true, lambda: false, time: false, space: false, frames: scene.playback.frames };
+    let mut better: Option<Made> = None;
+    let all: usize = climbs.iter().map(|(_, tries)| tries).sum();
+    let mut tried = 0;
+    for &(steps, tries) in climbs {
+        climb((usual.settings, usual.worth(picture)), &free, steps, tries, |settings| {
+            progress("trying other cells", f64::from(tried) / all as f64);
+            tried += 1;
+            let encoded = bake::encode(scene, flat, settings, &|_, _| {})?;
+            let quality = verify::against_exact(&encoded.bundle, &flat.atlas, &|_, _| {})?;
+            let made = Made { settings: *settings, encoded, quality };
+            let worth = made.worth(picture);
+            if worth > better.as_ref().unwrap_or(&usual).worth(picture) {
+                better = Some(made);
+            }
+            Ok(Some(worth))
+        })?;
+        if better.is_some() {
+            break;
+        }
     }
+    let Some(better) = better else { return Ok((usual, None)) };
     let Settings { cell, key_interval, .. } = usual.settings;
     let said = format!(
-        "{why}: --cell {} --key-interval {} are used, {:.1} dB in place of {:.1} with {cell} and {key_interval}, at {} B of working memory in place \
-         of {}; give --cell {cell} for the latter",
-        settings.cell,
-        settings.key_interval,
-        tried.quality.psnr_mean,
-        usual.quality.psnr_mean,
-        tried.memory(),
-        usual.memory(),
+        "{why}: --cell {} --key-interval {} are used, {}; with {cell} and {key_interval} it were {}: give --cell {cell} for that",
+        better.settings.cell,
+        better.settings.key_interval,
+        better.told(picture),
+        usual.told(picture),
     );
-    Ok((tried, Some(said)))
+    Ok((better, Some(said)))
 }
 
 #[cfg(test)]
@@ -123,24 +136,32 @@ mod tests {
         let settings = Settings { cell: 8, key_interval: 16, ..Settings::default() };
         let (scene, flat, usual) = made("terrain", [96, 72], 65, settings);
         let picture = image_bytes(&flat.atlas.image, settings.atlas.storage);
-        let (before, memory) = (usual.worth(picture), usual.memory());
+        let (before, told) = (usual.worth(picture), usual.told(picture));
         let (kept, said) = choose(&scene, &flat, usual, &|_, _| {}).unwrap();
         assert_eq!((kept.settings.cell, kept.settings.key_interval), (16, 8));
         let said = said.unwrap();
-        assert!(kept.worth(picture) > before && said.contains(&memory) && said.contains("--cell 16 --key-interval 8"), "{before} {said}");
+        assert!(kept.worth(picture) > before && said.contains(&told) && said.contains("--cell 16 --key-interval 8"), "{before} {said}");
     }
 
     #[test]
-    fn cells_and_intervals_stay_in_their_range() {
-        let tried = |cell, key_interval, wrong_surface_percent, p99| {
+    fn fast_turns_get_closer_keys() {
+        // A twelfth of a circle around the cone in five frames.
+        let settings = Settings { cell: 8, key_interval: 8, ..Settings::default() };
+        let (scene, flat, usual) = made("cone-orbit", [96, 72], 9, settings);
+        let before = usual.quality.psnr_mean;
+        let (kept, said) = choose(&scene, &flat, usual, &|_, _| {}).unwrap();
+        assert!(kept.settings.key_interval < 8 && kept.quality.psnr_mean > before + 2.0, "{before} {said:?}");
+    }
+
+    #[test]
+    fn nothing_is_tried_where_neither_outlines_nor_bends_are_many() {
+        let tried = |wrong_surface_percent, p99| {
             let path_error_texels = verify::PathError { p99, ..verify::PathError::default() };
-            let quality = Quality { wrong_surface_percent, path_error_texels, ..Quality::default() };
-            other(&Settings { cell, key_interval, ..Settings::default() }, &quality).map(|(s, _)| (s.cell, s.key_interval))
+            climbs(&Quality { wrong_surface_percent, path_error_texels, ..Quality::default() })
+                .map(|(_, why)| why.split(' ').next().unwrap())
         };
         // Torn, whether or not bent; bent; neither.
-        assert_eq!([tried(8, 8, 2.0, 0.0), tried(8, 8, 2.0, 9.0)], [Some((4, 16)); 2]);
-        assert_eq!([tried(8, 8, 1.9, 2.0), tried(8, 8, 1.9, 1.9)], [Some((16, 4)), None]);
-        assert_eq!([tried(4, 8, 9.0, 9.0), tried(8, 200, 9.0, 9.0)], [None; 2]);
-        assert_eq!([tried(32, 8, 0.0, 9.0), tried(16, 1, 0.0, 9.0), tried(16, 3, 0.0, 9.0)], [None, None, Some((32, 1))]);
+        assert_eq!([tried(2.0, 0.0), tried(2.0, 9.0), tried(1.9, 2.0)], [Some("many"), Some("many"), Some("surfaces")]);
+        assert_eq!(tried(1.9, 1.9), None);
     }
 }

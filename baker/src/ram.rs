@@ -5,7 +5,7 @@
 //! straight, and fewer layers in either where cells are larger. What each of these loses differs from scene to scene: it is measured.
 
 use crate::bake::{BakeError, Encoded, Flat, Settings};
-use crate::climb::{Free, climb};
+use crate::climb::{Free, Step, climb};
 use crate::encode::image_bytes;
 use crate::inspect::{space_name, time_name};
 use crate::job::Chosen;
@@ -156,7 +156,7 @@ impl Search<'_> {
             frames: self.scene.playback.frames,
         };
         let mut step = 0;
-        climb(start, &free, STEPS, |settings| {
+        climb(start, &free, &Step::ALL, STEPS, |settings| {
             self.say(step, STEPS);
             step += 1;
             let Some(tried) = self.attempt(flat, *settings, found)?.filter(|tried| tried.memory <= room) else { return Ok(None) };

@@ -4,7 +4,7 @@
 
 use crate::atlas::{self, Storage};
 use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings, Sparing};
-use crate::climb::{Free, climb};
+use crate::climb::{Free, Step, climb};
 use crate::encode::{self, image_bytes};
 use crate::gbuffer::Hits;
 use crate::job::{self, Chosen, Goal, Options};
@@ -257,7 +257,7 @@ impl Search<'_> {
             _ => self.flat(start.0.atlas)?,
         };
         let mut step = steps - STEPS;
-        let (settings, found) = climb(start, &self.free(false), STEPS, |settings| {
+        let (settings, found) = climb(start, &self.free(false), &Step::ALL, STEPS, |settings| {
             self.say(step, steps);
             step += 1;
             score(&flat, settings, false)
@@ -293,7 +293,11 @@ impl Search<'_> {
                 room = room.max(memory);
             }
             nearest = nearest.max(psnr);
-            Ok((!reached || memory <= room).then(|| if reached { REACHED - bundle.len() as f64 } else { psnr }))
+            Ok(match reached {
+                true if memory <= room => Some(REACHED - bundle.len() as f64),
+                true => None,
+                false => Some(psnr),
+            })
         };
         let mut best: Option<(Settings, f64)> = None;
         for (turn, ratio) in DENSITIES.into_iter().enumerate().filter(|&(turn, ratio)| turn == 0 || ratio < 0.8) {
@@ -315,7 +319,7 @@ impl Search<'_> {
             }
             let Some(start) = best else { continue };
             let most = if turn == 0 || start.1 > REACHED / 2.0 { STEPS } else { 0 };
-            let (settings, found) = climb(start, &self.free(true), most, |settings| score(&flat, settings, false))?;
+            let (settings, found) = climb(start, &self.free(true), &Step::ALL, most, |settings| score(&flat, settings, false))?;
             best = Some((settings, found));
             if found > REACHED / 2.0 {
                 let coarser = (turn > 0).then(|| {
