@@ -33,11 +33,11 @@ impl Made {
         metrics::worth(self.quality.psnr_mean, self.encoded.bundle.len().saturating_sub(picture) as u64, DOUBLE)
     }
 
-    /// What it is in the words of a warning, `picture` being what its source image takes.
-    fn told(&self, picture: usize) -> String {
+    /// What it is in the words of a warning.
+    fn told(&self) -> String {
         let Self { encoded: Encoded { bundle, .. }, quality, .. } = self;
         let memory = Bundle::parse(bundle).map(|bundle| grouped(bundle.memory_needed())).unwrap_or_default();
-        format!("{:.1} dB in {} B of keys and {memory} B of memory", quality.psnr_mean, grouped(bundle.len().saturating_sub(picture)))
+        format!("{:.1} dB in a bundle of {} B and {memory} B of memory", quality.psnr_mean, grouped(bundle.len()))
     }
 }
 
@@ -90,8 +90,8 @@ pub(crate) fn choose(scene: &Scene, flat: &Flat, usual: Made, progress: Progress
         "{why}: --cell {} --key-interval {} are used, {}; with {cell} and {key_interval} it were {}: give --cell {cell} for that",
         better.settings.cell,
         better.settings.key_interval,
-        better.told(picture),
-        usual.told(picture),
+        better.told(),
+        usual.told(),
     );
     Ok((better, Some(said)))
 }
@@ -136,7 +136,7 @@ mod tests {
         let settings = Settings { cell: 8, key_interval: 16, ..Settings::default() };
         let (scene, flat, usual) = made("terrain", [96, 72], 65, settings);
         let picture = image_bytes(&flat.atlas.image, settings.atlas.storage);
-        let (before, told) = (usual.worth(picture), usual.told(picture));
+        let (before, told) = (usual.worth(picture), usual.told());
         let (kept, said) = choose(&scene, &flat, usual, &|_, _| {}).unwrap();
         assert_eq!((kept.settings.cell, kept.settings.key_interval), (16, 8));
         let said = said.unwrap();
