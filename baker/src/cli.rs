@@ -145,8 +145,9 @@ pub struct Bake {
     pub psnr: Option<f64>,
     /// Playing takes at most this many bytes of working memory (also 48K), at the best quality that does.
     ///
-    /// Where the bundle needs more, linear --time, linear --space and larger cells are tried, each unless it is given (cells only grow), and as a
-    /// last resort a shorter --key-interval; what was given up is said at the end. A row of pixels comes on top: two bytes each.
+    /// A bundle that needs no more stays as it is. Else linear --time, linear --space, larger cells and closer keys are tried, each unless it is
+    /// given (a given cell may grow all the same), and from what fits on to what is worth more; what was given up is said at the end. A row of
+    /// pixels comes on top: two bytes each.
     #[arg(long, value_name = "BYTES", value_parser = budget)]
     pub ram: Option<u64>,
     /// Writes bytes, seconds, quality and warnings as JSON.

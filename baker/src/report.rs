@@ -315,7 +315,9 @@ pub fn table(report: &Report) -> Vec<(String, String)> {
     let looping = if report.looping { ", looping" } else { "" };
     row("scene", format!("{}: {} triangles, {} rays", report.scene, grouped(report.triangles), grouped(report.rays as usize)));
     row("playback", format!("{} frames of {width} x {height}, {} frames/s{looping}", report.frames, report.fps));
-    row("grid", format!("{} keys, one every {} frames; cells of {} pixels", grid.keys, grid.key_interval, grid.cell));
+    // A path shorter than the interval has keys at its ends all the same.
+    let every = grid.key_interval.min(report.frames.saturating_sub(1).max(1));
+    row("grid", format!("{} keys, one every {every} frames; cells of {} pixels", grid.keys, grid.cell));
     row(
         "source image",
         format!(

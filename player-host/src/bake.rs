@@ -1,5 +1,5 @@
 //! The one place where the player calls the baker.
-//! A scene comes in from `input`; bundle bytes and rows for the table go back.
+//! A scene comes in from `input`; bundle bytes, rows for the table and warnings go back.
 
 use anyhow::{Context, Result};
 use cubist_baker::job::{self, Options, TruthFrames};
@@ -16,8 +16,15 @@ pub enum Scene<'a> {
     File(&'a Path),
 }
 
-/// A bundle, and rows of name and value for the table.
-pub type Baked = (Vec<u8>, Vec<(String, String)>);
+/// What was baked.
+pub struct Baked {
+    /// The bundle.
+    pub bytes: Vec<u8>,
+    /// Rows of name and value for the table.
+    pub rows: Vec<(String, String)>,
+    /// What the user should know about the scene: each names it.
+    pub warnings: Vec<String>,
+}
 
 /// Bakes `scene`; `progress` hears the stage by name and how much of it is done, 0 to 1.
 pub fn bake(scene: Scene<'_>, progress: &(dyn Fn(&str, f32) + Sync)) -> Result<Baked> {
@@ -29,6 +36,7 @@ pub fn bake(scene: Scene<'_>, progress: &(dyn Fn(&str, f32) + Sync)) -> Result<B
     // Someone waits for the picture: the antialiased truth is for `cubist-bake --report`.
     let options = Options { truth: TruthFrames::None, ..Options::default() };
     let hear = |stage: &str, part: f64| progress(stage, part as f32);
-    let (bundle, report) = job::bake_scene(&scene, &options, &hear).with_context(|| name)?;
-    Ok((bundle, report::table(&report)))
+    let (bytes, report) = job::bake_scene(&scene, &options, &hear).with_context(|| name.clone())?;
+    let warnings = report.warnings.iter().map(|warning| format!("{name}: {warning}")).collect();
+    Ok(Baked { bytes, rows: report::table(&report), warnings })
 }

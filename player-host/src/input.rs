@@ -1,11 +1,12 @@
 //! What the user gave, as a bundle: read from a file, or baked from a scene.
 //! A path comes in from `cli`; checked bytes go to the commands.
 
-use crate::bake::{Scene, bake};
+use crate::bake::{Baked, Scene, bake};
 use crate::cli::Usage;
 use crate::progress::progress;
 use anyhow::{Context, Result, anyhow};
 use cubist_baker::files::same;
+use cubist_baker::terminal::tell;
 use cubist_core::Bundle;
 use std::path::Path;
 
@@ -68,6 +69,9 @@ fn baked(name: String, scene: Scene<'_>) -> Result<Loaded> {
         bar.set_position((done.clamp(0.0, 1.0) * 1000.0) as u64);
     });
     bar.finish_and_clear();
-    let (bytes, rows) = result?;
+    let Baked { bytes, rows, warnings } = result?;
+    for warning in warnings {
+        tell(format_args!("warning: {warning}"));
+    }
     Ok(Loaded { name, bytes, rows })
 }
