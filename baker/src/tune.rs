@@ -361,7 +361,7 @@ mod tests {
 
     fn small(name: &str) -> Scene {
         let mut scene = builtin::build(name).unwrap();
-        (scene.playback.width, scene.playback.height, scene.playback.frames) = (64, 48, 12);
+        (scene.playback.width, scene.playback.height, scene.playback.frames) = (48, 36, 9);
         scene
     }
 
