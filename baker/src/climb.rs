@@ -101,13 +101,13 @@ fn after(from: &Settings, step: Step, free: &Free) -> Option<Settings> {
     let mut to = *from;
     to.cell = rung(&CELLS, from.cell, step.cell)?;
     let scaled = if step.scale < 0 { from.key_interval >> -step.scale } else { from.key_interval << step.scale };
-    to.key_interval = rung(&INTERVALS, scaled, step.interval).filter(|&interval| (1..=LONGEST).contains(&interval))?;
+    to.key_interval = rung(&INTERVALS, scaled, step.interval)?;
     to.coding.lambda = rung(&LAMBDAS, from.coding.lambda, step.lambda)?;
     let other = |now: u8, [a, b]: [u8; 2]| if now == a { b } else { a };
     to.time = if step.time { other(from.time, [TIME_LINEAR, TIME_CUBIC]) } else { from.time };
     to.space = if step.space { other(from.space, [SPACE_LINEAR, SPACE_CUBIC]) } else { from.space };
-    let fits = (1..free.frames.max(2)).contains(&to.key_interval) || to.key_interval == from.key_interval;
-    fits.then_some(to)
+    let longest = (free.frames.max(2) - 1).min(LONGEST);
+    ((1..=longest).contains(&to.key_interval) || to.key_interval == from.key_interval).then_some(to)
 }
 
 /// What tells settings apart here.

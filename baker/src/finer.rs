@@ -11,7 +11,6 @@ use crate::report::grouped;
 use crate::scene::Scene;
 use crate::spare::DOUBLE;
 use crate::verify::{self, Quality};
-use cubist_core::Bundle;
 
 /// Wrong pixels, percent, from which on smaller cells are worth a try. Most scenes have a tenth of that.
 const TORN: f64 = 2.0;
@@ -28,6 +27,13 @@ pub(crate) struct Made {
 }
 
 impl Made {
+    /// What `settings` make of it.
+    fn new(scene: &Scene, flat: &Flat, settings: Settings) -> Result<Self, BakeError> {
+        let encoded = bake::encode(scene, flat, &settings, &|_, _| {})?;
+        let quality = verify::against_exact(&encoded.bundle, &flat.atlas, &|_, _| {})?;
+        Ok(Self { settings, encoded, quality })
+    }
+
     /// Quality less what `picture` bytes leave for keys, dB.
     fn worth(&self, picture: usize) -> f64 {
         metrics::worth(self.quality.psnr_mean, self.encoded.bundle.len().saturating_sub(picture) as u64, DOUBLE)
@@ -36,7 +42,7 @@ impl Made {
     /// What it is in the words of a warning.
     fn told(&self) -> String {
         let Self { encoded: Encoded { bundle, .. }, quality, .. } = self;
-        let memory = Bundle::parse(bundle).map(|bundle| grouped(bundle.memory_needed())).unwrap_or_default();
+        let memory = verify::memory(bundle).map(grouped).unwrap_or_default();
         format!("{:.1} dB in a bundle of {} B and {memory} B of memory", quality.psnr_mean, grouped(bundle.len()))
     }
 }
@@ -71,9 +77,7 @@ pub(crate) fn choose(scene: &Scene, flat: &Flat, usual: Made, progress: Progress
         climb((usual.settings, usual.worth(picture)), &free, steps, tries, |settings| {
             progress("trying other cells", f64::from(tried) / all as f64);
             tried += 1;
-            let encoded = bake::encode(scene, flat, settings, &|_, _| {})?;
-            let quality = verify::against_exact(&encoded.bundle, &flat.atlas, &|_, _| {})?;
-            let made = Made { settings: *settings, encoded, quality };
+            let made = Made::new(scene, flat, *settings)?;
             let worth = made.worth(picture);
             if worth > better.as_ref().unwrap_or(&usual).worth(picture) {
                 better = Some(made);
@@ -105,9 +109,8 @@ mod tests {
         let mut scene = builtin::build(name).unwrap();
         (scene.playback.width, scene.playback.height, scene.playback.frames) = (size[0], size[1], frames);
         let flat = bake::flatten(&scene, &settings.atlas, &|_, _| {}).unwrap();
-        let encoded = bake::encode(&scene, &flat, &settings, &|_, _| {}).unwrap();
-        let quality = verify::against_exact(&encoded.bundle, &flat.atlas, &|_, _| {}).unwrap();
-        (scene, flat, Made { settings, encoded, quality })
+        let made = Made::new(&scene, &flat, settings).unwrap();
+        (scene, flat, made)
     }
 
     #[test]

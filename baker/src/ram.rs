@@ -11,7 +11,7 @@ use crate::inspect::{space_name, time_name};
 use crate::job::Chosen;
 use crate::metrics;
 use crate::report::grouped;
-use crate::tune::{Search, memory_needed, possible};
+use crate::tune::{Search, possible};
 use crate::verify;
 use cubist_core::format::{Envelope, PATH, Path, SPACE_LINEAR, TIME_LINEAR};
 use cubist_core::{Bundle, checksum};
@@ -146,15 +146,7 @@ impl Search<'_> {
 
     /// Steps from `start`, which fits, to what is worth more and fits too.
     fn refine(&self, flat: &Flat, start: (Settings, f64), room: usize, found: &mut Found) -> Result<(), BakeError> {
-        let options = self.options;
-        let free = Free {
-            cell: options.cell.is_none(),
-            interval: options.key_interval.is_none(),
-            lambda: false,
-            time: options.time.is_none(),
-            space: options.space.is_none(),
-            frames: self.scene.playback.frames,
-        };
+        let free = Free { lambda: false, ..self.free() };
         let mut step = 0;
         climb(start, &free, &Step::ALL, STEPS, |settings| {
             self.say(step, STEPS);
@@ -168,7 +160,7 @@ impl Search<'_> {
     /// Makes a bundle; `None` where no bundle can hold it.
     fn attempt(&self, flat: &Flat, settings: Settings, found: &mut Found) -> Result<Option<Tried>, BakeError> {
         let Some(encoded) = possible(self.encode(flat, &settings), &mut found.exceeded)? else { return Ok(None) };
-        let memory = memory_needed(&encoded.bundle)?;
+        let memory = verify::memory(&encoded.bundle)?;
         found.smallest = Some(found.smallest.map_or(memory, |smallest| smallest.min(memory)));
         Ok(Some(Tried { settings, encoded, memory }))
     }

@@ -12,8 +12,7 @@ use crate::report::grouped;
 use crate::samples::Samples;
 use crate::scene::Scene;
 use crate::trace::Tracer;
-use crate::verify::{self, VerifyError};
-use cubist_core::Bundle;
+use crate::verify;
 use std::time::Instant;
 
 /// Cells tried at first, pixels.
@@ -206,11 +205,17 @@ impl Search<'_> {
         exceeded.filter(|_| keys.is_empty()).map_or(Ok(keys), Err)
     }
 
-    /// What the steps may change that refine a search's choice, what a bit is worth being one of them or not.
-    fn free(&self, lambda: bool) -> Free {
-        let Options { cell, key_interval, .. } = *self.options;
-        let frames = self.scene.playback.frames;
-        Free { cell: cell.is_none(), interval: key_interval.is_none(), lambda, time: false, space: false, frames }
+    /// What the user left open, and what a bit is worth, which searches choose.
+    pub(crate) fn free(&self) -> Free {
+        let Options { cell, key_interval, time, space, .. } = *self.options;
+        Free {
+            cell: cell.is_none(),
+            interval: key_interval.is_none(),
+            lambda: true,
+            time: time.is_none(),
+            space: space.is_none(),
+            frames: self.scene.playback.frames,
+        }
     }
 
     /// Bakes the pairs that promise most until enough of them fit, and steps on from the best.
@@ -222,7 +227,7 @@ impl Search<'_> {
         // Of bundles that fit the better one counts, of those that do not the smaller one: from there steps may lead to one that does.
         let mut score = |flat: &Flat, settings: &Settings, first: bool| -> Result<Option<f64>, BakeError> {
             let Some(Encoded { bundle, .. }) = possible(self.encode(flat, settings), &mut exceeded)? else { return Ok(None) };
-            let (bytes, memory) = (bundle.len() as u64, memory_needed(&bundle)?);
+            let (bytes, memory) = (bundle.len() as u64, verify::memory(&bundle)?);
             smallest = smallest.min(bytes);
             if bytes > budget {
                 return Ok(Some(-(bytes as f64)));
@@ -256,8 +261,10 @@ impl Search<'_> {
             Some((density, flat)) if density == start.0.atlas.density => flat,
             _ => self.flat(start.0.atlas)?,
         };
+        // Coarser coding is what makes a bundle fit.
+        let free = Free { lambda: false, time: false, space: false, ..self.free() };
         let mut step = steps - STEPS;
-        let (settings, found) = climb(start, &self.free(false), &Step::ALL, STEPS, |settings| {
+        let (settings, found) = climb(start, &free, &Step::ALL, STEPS, |settings| {
             self.say(step, steps);
             step += 1;
             score(&flat, settings, false)
@@ -287,7 +294,7 @@ impl Search<'_> {
             step += 1;
             let Some(Encoded { bundle, .. }) = possible(self.encode(flat, settings), &mut exceeded)? else { return Ok(None) };
             let psnr = verify::against_exact(&bundle, &flat.atlas, &|_, _| {})?.psnr_mean;
-            let (reached, memory) = (psnr >= asked, memory_needed(&bundle)?);
+            let (reached, memory) = (psnr >= asked, verify::memory(&bundle)?);
             // Memory is no matter until there is one that reaches it.
             if first || (reached && nearest < asked) {
                 room = room.max(memory);
@@ -299,6 +306,7 @@ impl Search<'_> {
                 false => Some(psnr),
             })
         };
+        let free = Free { time: false, space: false, ..self.free() };
         let mut best: Option<(Settings, f64)> = None;
         for (turn, ratio) in DENSITIES.into_iter().enumerate().filter(|&(turn, ratio)| turn == 0 || ratio < 0.8) {
             let wanted = atlas::Settings { density: source.density * ratio, ..source };
@@ -317,9 +325,9 @@ impl Search<'_> {
                 settings.atlas = wanted;
                 *found = score(&flat, settings, false)?.unwrap_or(0.0);
             }
-            let Some(start) = best else { continue };
+            let Some(start) = best else { break };
             let most = if turn == 0 || start.1 > REACHED / 2.0 { STEPS } else { 0 };
-            let (settings, found) = climb(start, &self.free(true), &Step::ALL, most, |settings| score(&flat, settings, false))?;
+            let (settings, found) = climb(start, &free, &Step::ALL, most, |settings| score(&flat, settings, false))?;
             best = Some((settings, found));
             if found > REACHED / 2.0 {
                 let coarser = (turn > 0).then(|| {
@@ -334,11 +342,6 @@ impl Search<'_> {
         // Not a single bundle: what was in the way is the answer.
         Err(exceeded.filter(|_| best.is_none()).unwrap_or(BakeError::Psnr { asked, nearest, held: self.options.held(true) }))
     }
-}
-
-/// Bytes of working memory that a player of `bundle` needs.
-pub(crate) fn memory_needed(bundle: &[u8]) -> Result<usize, BakeError> {
-    Ok(Bundle::parse(bundle).map_err(VerifyError::from)?.memory_needed())
 }
 
 /// What came of an attempt; `None` where a bundle cannot hold it: that ends the attempt, not the search. The first to exceed

@@ -354,6 +354,14 @@ pub fn against_truth(
     })
 }
 
+/// Bytes of working memory that a player of a bundle asks for.
+///
+/// # Errors
+/// [`VerifyError`] where the player refuses the bytes.
+pub fn memory(bytes: &[u8]) -> Result<usize, VerifyError> {
+    Ok(Bundle::parse(bytes)?.memory_needed())
+}
+
 /// Plays all frames in order on one thread and counts the work.
 ///
 /// # Errors
