@@ -177,7 +177,7 @@ fn changed_bytes_with_a_matching_checksum_never_panic() {
     let mut random = Random(1);
     let texels = range(ATLAS);
     let mut played = 0;
-    for round in 0..12_000 {
+    for round in 0..4_000 {
         let mut bytes = sound().to_vec();
         let everywhere = 0..bytes.len() - 4;
         // Texels are the most bytes and the dullest: most changes go to headers, labels and keys.
@@ -193,7 +193,7 @@ fn changed_bytes_with_a_matching_checksum_never_panic() {
         played += usize::from(survives(&bytes));
     }
     // If nearly all were refused, the test would say little about playing.
-    assert!((2_400..11_400).contains(&played), "{played} of 12000 played");
+    assert!((800..3_800).contains(&played), "{played} of 4000 played");
 }
 
 proptest! {

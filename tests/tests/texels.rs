@@ -151,10 +151,10 @@ fn a_player_of_other_texels_says_what_the_bundle_needs() {
 #[test]
 fn more_colours_are_no_worse() {
     for name in ["terrain", "mirrors", "torus"] {
-        let scene = scenes::reduced(name, [160, 120], 8).expect("a built-in scene");
+        let scene = scenes::reduced(name, [96, 72], 3).expect("a built-in scene");
         let psnr = [TexelKind::Indexed4, TexelKind::Indexed8, TexelKind::Direct565].map(|texels| {
             let source = cubist_baker::atlas::Settings { texels, ..Settings::default().atlas };
-            let options = Options { source, truth: TruthFrames::All, ..Options::default() };
+            let options = Options { source, cell: Some(8), key_interval: Some(1), truth: TruthFrames::All, ..Options::default() };
             let (_, report) = bake_scene(&scene, &options, &|_, _| {}).expect("it bakes");
             assert_eq!(report.source_image.texels, texels);
             report.quality_vs_truth.expect("it was asked for").psnr_mean
