@@ -336,7 +336,11 @@ impl Assembled {
         let element = &mut self.element;
         let mut sets = element.set.iter().zip(&element.layer).filter(|(_, layer)| layer[1] != NOWHERE).map(|(&set, _)| set);
         let first = sets.next().unwrap_or(0);
-        if sets.all(|set| set == first) && sums.iter().all(|other| *other == sums[0]) {
+        let alike = sets.all(|set| set == first);
+        if alike {
+            element.set = [first; NODES];
+        }
+        if alike && sums.iter().all(|other| *other == sums[0]) {
             let interval = element.interval as usize;
             let mut squares = [[0.0; 4]; 4];
             for frame in problem.grid.frames_of(interval) {
@@ -389,57 +393,63 @@ impl Element {
     /// Adds the element's share of the product A x to `y`.
     fn multiply(&self, weights: &[[[f32; 4]; 4]], x: &[[f64; 2]], y: &mut [[f64; 2]]) {
         let value = |layer: u32| if layer == NOWHERE { [0.0; 2] } else { x[layer as usize].map(|x| x as f32) };
-        let at = self.layer.map(|layers| layers.map(value));
-        let mut out = [[[0.0f32; 2]; 4]; NODES];
+        // Key by key: what follows is the same for all nodes, and for both axes.
+        let at: [AtNodes; 4] = std::array::from_fn(|key| self.layer.map(|layers| value(layers[key])));
+        let mut out = [[[0.0f32; 2]; NODES]; 4];
         match &self.pixels {
             Pixels::Same(sums, squares) => {
-                let products: [AtPoints; 4] = std::array::from_fn(|key| {
-                    let nodes: AtNodes = std::array::from_fn(|node| at[node][key]);
-                    sums.times(&self.stencil.points(&nodes))
-                });
-                for key in 0..4 {
+                let products = at.map(|nodes| sums.times(&self.stencil.points(&nodes)));
+                for (out, squares) in out.iter_mut().zip(squares) {
                     let mut mixed = [[0.0; 2]; POINTS];
-                    for (product, weight) in products.iter().zip(squares[key]) {
+                    for (product, weight) in products.iter().zip(squares) {
                         for (sum, value) in mixed.iter_mut().zip(product) {
                             sum[0] += weight * value[0];
                             sum[1] += weight * value[1];
                         }
                     }
-                    for (out, value) in out.iter_mut().zip(self.stencil.transposed(&mixed)) {
-                        out[key] = value;
-                    }
+                    *out = self.stencil.transposed(&mixed);
                 }
             }
             Pixels::Each(frames) => {
                 for (sums, weights) in frames.iter().zip(weights) {
-                    let nodes: AtNodes = std::array::from_fn(|node| {
-                        let [a, b, c, d] = weights[usize::from(self.set[node])];
-                        let at = &at[node];
-                        [0, 1].map(|axis| a * at[0][axis] + b * at[1][axis] + c * at[2][axis] + d * at[3][axis])
+                    let weights = self.spread(weights);
+                    let ([a, b, c, d], [e, f, g, h]) = (&weights, &at);
+                    let nodes = std::array::from_fn(|node| {
+                        [0, 1].map(|i| a[node][i] * e[node][i] + b[node][i] * f[node][i] + c[node][i] * g[node][i] + d[node][i] * h[node][i])
                     });
                     let back = self.stencil.transposed(&sums.times(&self.stencil.points(&nodes)));
-                    for (node, value) in back.iter().enumerate() {
-                        for (out, weight) in out[node].iter_mut().zip(weights[usize::from(self.set[node])]) {
-                            out[0] += weight * value[0];
-                            out[1] += weight * value[1];
+                    for (out, weights) in out.iter_mut().zip(&weights) {
+                        for (node, value) in back.iter().enumerate() {
+                            out[node][0] += weights[node][0] * value[0];
+                            out[node][1] += weights[node][1] * value[1];
                         }
                     }
                 }
             }
         }
         let corner = |bits: usize| (CORNERS[bits & 3], 1 + (bits >> 2));
-        let held = regularised(self.volume, &std::array::from_fn(|bits| at[corner(bits).0][corner(bits).1]));
+        let held = regularised(self.volume, &std::array::from_fn(|bits| at[corner(bits).1][corner(bits).0]));
         for (bits, value) in held.iter().enumerate() {
             let (node, key) = corner(bits);
-            out[node][key][0] += value[0];
-            out[node][key][1] += value[1];
+            out[key][node][0] += value[0];
+            out[key][node][1] += value[1];
         }
-        for (layers, out) in self.layer.iter().zip(&out) {
-            for (&layer, out) in layers.iter().zip(out).filter(|&(&layer, _)| layer != NOWHERE) {
-                y[layer as usize][0] += f64::from(out[0]);
-                y[layer as usize][1] += f64::from(out[1]);
+        for (node, layers) in self.layer.iter().enumerate() {
+            for (&layer, out) in layers.iter().zip(&out).filter(|&(&layer, _)| layer != NOWHERE) {
+                y[layer as usize][0] += f64::from(out[node][0]);
+                y[layer as usize][1] += f64::from(out[node][1]);
             }
         }
+    }
+
+    /// What each key weighs at each node at a moment, for both axes.
+    fn spread(&self, weights: &[[f32; 4]; 4]) -> [AtNodes; 4] {
+        let first = self.set[0];
+        // One set for all is the rule, and much faster.
+        if self.set == [first; NODES] {
+            return weights[usize::from(first)].map(|weight| [[weight; 2]; NODES]);
+        }
+        std::array::from_fn(|key| self.set.map(|set| [weights[usize::from(set)][key]; 2]))
     }
 }
 
