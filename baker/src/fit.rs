@@ -336,11 +336,7 @@ impl Assembled {
         let element = &mut self.element;
         let mut sets = element.set.iter().zip(&element.layer).filter(|(_, layer)| layer[1] != NOWHERE).map(|(&set, _)| set);
         let first = sets.next().unwrap_or(0);
-        let alike = sets.all(|set| set == first);
-        if alike {
-            element.set = [first; NODES];
-        }
-        if alike && sums.iter().all(|other| *other == sums[0]) {
+        if sets.all(|set| set == first) && sums.iter().all(|other| *other == sums[0]) {
             let interval = element.interval as usize;
             let mut squares = [[0.0; 4]; 4];
             for frame in problem.grid.frames_of(interval) {
@@ -411,17 +407,18 @@ impl Element {
                 }
             }
             Pixels::Each(frames) => {
+                let masks = self.masks();
                 for (sums, weights) in frames.iter().zip(weights) {
-                    let weights = self.spread(weights);
-                    let ([a, b, c, d], [e, f, g, h]) = (&weights, &at);
-                    let nodes = std::array::from_fn(|node| {
-                        [0, 1].map(|i| a[node][i] * e[node][i] + b[node][i] * f[node][i] + c[node][i] * g[node][i] + d[node][i] * h[node][i])
-                    });
+                    let spread = spread(&masks, weights);
+                    let mut nodes = [[0.0; 2]; NODES];
+                    for (i, node) in nodes.as_flattened_mut().iter_mut().enumerate() {
+                        let [a, b, c, d]: [f32; 4] = std::array::from_fn(|key| spread[key][i] * at[key].as_flattened()[i]);
+                        *node = a + b + c + d;
+                    }
                     let back = self.stencil.transposed(&sums.times(&self.stencil.points(&nodes)));
-                    for (out, weights) in out.iter_mut().zip(&weights) {
-                        for (node, value) in back.iter().enumerate() {
-                            out[node][0] += weights[node][0] * value[0];
-                            out[node][1] += weights[node][1] * value[1];
+                    for (out, weights) in out.iter_mut().zip(&spread) {
+                        for ((out, weight), value) in out.as_flattened_mut().iter_mut().zip(weights).zip(back.as_flattened()) {
+                            *out += weight * value;
                         }
                     }
                 }
@@ -442,15 +439,22 @@ impl Element {
         }
     }
 
-    /// What each key weighs at each node at a moment, for both axes.
-    fn spread(&self, weights: &[[f32; 4]; 4]) -> [AtNodes; 4] {
-        let first = self.set[0];
-        // One set for all is the rule, and much faster.
-        if self.set == [first; NODES] {
-            return weights[usize::from(first)].map(|weight| [[weight; 2]; NODES]);
-        }
-        std::array::from_fn(|key| self.set.map(|set| [weights[usize::from(set)][key]; 2]))
+    /// For each set of weights, all bits where a node has it: a number for either axis of every node.
+    fn masks(&self) -> [[u32; 2 * NODES]; 4] {
+        std::array::from_fn(|set| std::array::from_fn(|i| if usize::from(self.set[i / 2]) == set { u32::MAX } else { 0 }))
     }
+}
+
+/// What each key weighs at a moment, for either axis of every node. Masks, for what is looked up one by one cannot be computed side by side.
+fn spread(masks: &[[u32; 2 * NODES]; 4], weights: &[[f32; 4]; 4]) -> [[f32; 2 * NODES]; 4] {
+    let mut spread = [[0.0; 2 * NODES]; 4];
+    for (key, spread) in spread.iter_mut().enumerate() {
+        let [a, b, c, d] = weights.map(|set| set[key].to_bits());
+        for (i, weight) in spread.iter_mut().enumerate() {
+            *weight = f32::from_bits(masks[0][i] & a | masks[1][i] & b | masks[2][i] & c | masks[3][i] & d);
+        }
+    }
+    spread
 }
 
 /// y = A x: runs of elements side by side, each in a fixed order, added up in a fixed order: the same sums on any number of threads.

@@ -1,7 +1,6 @@
 //! The layout that ARCHITECTURE.md describes, held against the sources: who may name what, and how a file looks.
 //! Every `.rs` file of the checkout comes in, and the manifests; out come the places that break a rule.
 
-#[path = "architecture/source.rs"]
 mod source;
 
 use source::Source;

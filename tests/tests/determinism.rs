@@ -6,7 +6,7 @@ use cubist_core::{Bundle, ByteOrder, Frame, Player};
 use cubist_tests::{play, scenes};
 use rayon::ThreadPoolBuilder;
 
-const FRAMES: u32 = 24;
+const FRAMES: u32 = 16;
 
 fn bake(name: &str) -> Vec<u8> {
     scenes::bundle(name, [80, 60], FRAMES, &Settings { key_interval: 5, ..Settings::default() }).expect("a built-in scene bakes")

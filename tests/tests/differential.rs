@@ -40,7 +40,7 @@ const DIFFERING_IN_TIME: f64 = 0.05;
 const WEIGHT: f64 = 0.5 / ONE as f64 + 8.0 / (1u32 << 28) as f64;
 
 /// The screen of most comparisons, pixels.
-const SIZE: [u32; 2] = [128, 96];
+const SIZE: [u32; 2] = [96, 72];
 
 /// What a comparison found.
 #[derive(Debug, Default)]
@@ -297,20 +297,18 @@ fn single_frames_agree() {
 
 #[test]
 fn every_kind_of_texels_agrees_however_stored() {
-    for (name, max_side) in [("street", 512), ("terrain", 256)] {
-        for storage in [Storage::Raw, Storage::Packed] {
-            let bake = |texels| {
-                let source = atlas::Settings { max_side, texels, storage, ..atlas::Settings::default() };
-                bake(name, SIZE, 17, &Settings { atlas: source, ..Settings::default() })
-            };
-            let (name, frames) = (format!("{name}, {storage:?}"), [0, 5, 11, 16]);
-            let (four, direct) = (bake(TexelKind::Indexed4), bake(TexelKind::Direct565));
-            check_as::<Indexed4>(&format!("{name}, 4 bits"), &four, frames);
-            check_as::<Direct565>(&format!("{name}, RGB565"), &direct, frames);
-            check(&name, &bake(TexelKind::Indexed8), frames);
-            check_as::<AnyTexels>(&format!("{name}, any: 4 bits"), &four, frames);
-            check_as::<AnyTexels>(&format!("{name}, any: RGB565"), &direct, frames);
-        }
+    for (name, max_side, storage) in [("street", 512, Storage::Raw), ("terrain", 256, Storage::Packed)] {
+        let bake = |texels| {
+            let source = atlas::Settings { max_side, texels, storage, ..atlas::Settings::default() };
+            bake(name, SIZE, 17, &Settings { atlas: source, ..Settings::default() })
+        };
+        let (name, frames) = (format!("{name}, {storage:?}"), [0, 5, 11, 16]);
+        let (four, direct) = (bake(TexelKind::Indexed4), bake(TexelKind::Direct565));
+        check_as::<Indexed4>(&format!("{name}, 4 bits"), &four, frames);
+        check_as::<Direct565>(&format!("{name}, RGB565"), &direct, frames);
+        check(&name, &bake(TexelKind::Indexed8), frames);
+        check_as::<AnyTexels>(&format!("{name}, any: 4 bits"), &four, frames);
+        check_as::<AnyTexels>(&format!("{name}, any: RGB565"), &direct, frames);
     }
 }
 
