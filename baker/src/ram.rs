@@ -226,7 +226,7 @@ mod tests {
 
     fn small() -> Scene {
         let mut scene = builtin::build("cone-orbit").unwrap();
-        (scene.playback.width, scene.playback.height, scene.playback.frames) = (80, 60, 13);
+        (scene.playback.width, scene.playback.height, scene.playback.frames) = (96, 72, 17);
         scene
     }
 
