@@ -1,4 +1,4 @@
-//! All tests of this folder in one program: they share what is linked, what is baked, and both processors.
+//! All tests of this folder in one program: they share what is linked, and both processors.
 
 mod command_line;
 mod hostile_scenes;

@@ -60,6 +60,21 @@ fn the_sources_are_found() {
 }
 
 #[test]
+fn no_file_of_tests_is_left_out() {
+    let mut found = Vec::new();
+    for folder in ["tests/tests/", "baker/tests/"] {
+        let program = source::file(&format!("{folder}all.rs"));
+        for source in source::below(folder) {
+            let name = source.path[folder.len()..].trim_end_matches(".rs");
+            if name != "all" && !name.contains('/') && !program.contains(&format!("\nmod {name};")) {
+                found.push(format!("{}: is not run; {folder}all.rs lacks `mod {name};`", source.path));
+            }
+        }
+    }
+    none(found);
+}
+
+#[test]
 fn every_file_says_what_it_is() {
     let silent = |s: &&Source| !s.text.starts_with("//! ");
     none(source::all().iter().filter(silent).map(|s| format!("{}: begins without a `//!` that says what it is", s.path)).collect());
