@@ -58,7 +58,7 @@ pub(crate) fn parse(bytes: &[u8], warnings: &mut Warnings) -> Result<Shell, Stri
             warnings.add(format!("texture {i} has no PNG or JPEG picture: drawn without it"));
         }
     }
-    // Read from text: sixty types read from values would make an eighth of this crate's code. The text is not the user's, nor is a place in it.
+    // Read from text: sixty types read from values would make a twelfth of this crate's code. The text is not the user's, nor is a place in it.
     let root = Root::from_str(&value.to_string()).map_err(|e| {
         let cause = e.to_string();
         format!("not a valid glTF 2.0 document: {}", cause.rsplit_once(" at line ").map_or(cause.as_str(), |(cause, _)| cause))
