@@ -4,7 +4,7 @@
 //!
 //! Things thinner than a few cells are *strips*: two fields, the distances from two opposite sides, both positive inside.
 
-use crate::fit::{self, Problem};
+use crate::fit::{self, Problem, Target};
 use crate::gbuffer::GBuffer;
 use crate::sheets::{KeyGrid, Layers, Sheets};
 use cubist_core::fixed::{field_code, field_distance};
@@ -48,7 +48,9 @@ type Distances = [Option<f32>; 4];
 pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers, labels: usize) -> Fields {
     let thin = thin_labels(gbuffer, grid, sheets, labels);
     let outlines = Outlines { gbuffer, grid, sheets, layers, thin: &thin };
-    let first = fit::solve_for(&outlines.problem(None, |index, sheet, pixel| outlines.target(index, sheet, pixel))).uv;
+    let first =
+        fit::solve_for(&outlines.problem(None, |index, frame, targets: &mut Vec<Target>| outlines.targets(index, frame, false, targets)))
+            .uv;
     let distance = outlines.refit(first, false);
     Fields { distance, thin }
 }
@@ -94,43 +96,47 @@ struct Outlines<'a> {
 }
 
 impl<'a> Outlines<'a> {
-    fn problem<T>(&self, known: Option<&'a [[f32; 2]]>, target: T) -> Problem<'a, T> {
+    fn problem<T>(&self, known: Option<&'a [[f32; 2]]>, targets: T) -> Problem<'a, T> {
         let &Outlines { grid, sheets, layers, .. } = self;
-        Problem { grid, sheets, layers, time: TIME_LINEAR, space: SPACE_LINEAR, prior: None, known, refit: hinge, target }
+        Problem { grid, sheets, layers, time: TIME_LINEAR, space: SPACE_LINEAR, prior: None, known, refit: hinge, targets }
     }
 
     /// `fields` after a few refits, to those sheets only that are tested or to all, as the player will have them.
     fn refit(&self, mut fields: Vec<[f32; 2]>, tested: bool) -> Vec<[f32; 2]> {
-        let target = |index: usize, sheet: usize, pixel: usize| {
-            let wanted = !tested || tests_field(self.sheets, index, sheet);
-            if wanted { self.target(index, sheet, pixel) } else { None }
-        };
+        let targets = |index: usize, frame: u32, targets: &mut Vec<Target>| self.targets(index, frame, tested, targets);
         for _ in 0..REFITS {
-            fields = fit::solve_for(&Outlines { ..*self }.problem(Some(&fields), target)).uv;
+            fields = fit::solve_for(&Outlines { ..*self }.problem(Some(&fields), targets)).uv;
         }
         fields.iter().map(|pair| pair.map(|field| distance(code(field)))).collect()
     }
 
-    /// The target and weight of a pixel for the sheet at a place in the list of its cell and interval.
-    fn target(&self, index: usize, sheet: usize, pixel: usize) -> Option<([f32; 2], f32)> {
+    /// What the sheets of a cell and interval ask of its pixels in a frame; of sheets that are tested by their fields, or of all.
+    fn targets(&self, index: usize, frame: u32, tested: bool, targets: &mut Vec<Target>) {
         let &Outlines { gbuffer, grid, .. } = self;
         let list = &self.sheets.lists[index];
         if list.len() < 2 {
-            return None;
+            return;
         }
-        let seen = list.iter().position(|&label| gbuffer.label[pixel] == u16::from(label));
-        // What is hidden by a sheet further in front does not matter, nor what no sheet shows.
-        if seen.is_none_or(|seen| seen < sheet) {
-            return None;
-        }
-        let inside = seen == Some(sheet);
+        let cell = index % grid.grid.cells();
+        // The place in the list of what each pixel shows.
+        let mut seen = Vec::new();
+        grid.each_pixel(frame, cell, |pixel, _| seen.push(list.iter().position(|&label| gbuffer.label[pixel] == u16::from(label))));
+        targets.resize(seen.len() * list.len(), None);
         let reach = REACH * (1u32 << grid.grid.log2) as f32;
-        let look = Look { gbuffer, grid, front: &list[..sheet], label: list[sheet], reach: reach as usize };
-        let distances = look.around(pixel, inside);
-        match self.thin[usize::from(list[sheet])] {
-            Thin::No => Some(signed(distances, inside, reach)),
-            Thin::Across => strip(distances[0], distances[1], inside, reach),
-            Thin::Down => strip(distances[2], distances[3], inside, reach),
+        for (sheet, &label) in list.iter().enumerate().filter(|&(sheet, _)| !tested || tests_field(self.sheets, index, sheet)) {
+            let look = Look { gbuffer, grid, front: &list[..sheet], label, reach: reach as usize };
+            for ((pixel, &seen), distances) in seen.iter().enumerate().zip(&look.around(frame, cell)) {
+                // What is hidden by a sheet further in front does not matter, nor what no sheet shows.
+                if seen.is_none_or(|seen| seen < sheet) {
+                    continue;
+                }
+                let inside = seen == Some(sheet);
+                targets[pixel * list.len() + sheet] = match self.thin[usize::from(label)] {
+                    Thin::No => Some(signed(*distances, inside, reach)),
+                    Thin::Across => strip(distances[0], distances[1], inside, reach),
+                    Thin::Down => strip(distances[2], distances[3], inside, reach),
+                };
+            }
         }
     }
 }
@@ -177,7 +183,7 @@ fn strip(before: Option<f32>, after: Option<f32>, inside: bool, reach: f32) -> O
     Some((pair, 1.0 / (1.0 + (nearest / FALLOFF) * (nearest / FALLOFF))))
 }
 
-/// Looks from a pixel along its row and column.
+/// Looks from the pixels of a cell along their rows and columns.
 struct Look<'a> {
     gbuffer: &'a GBuffer,
     grid: &'a KeyGrid,
@@ -188,23 +194,55 @@ struct Look<'a> {
 }
 
 impl Look<'_> {
-    /// The distances at which the sheet ends (`inside`) or begins, left, right, up and down.
-    fn around(&self, pixel: usize, inside: bool) -> Distances {
+    /// For every pixel of a cell in a frame the distances at which the sheet ends, where it shows, or begins.
+    fn around(&self, frame: u32, cell: usize) -> Vec<Distances> {
         let [width, height] = self.grid.size;
-        let (x, y) = (pixel % width, pixel / width % height);
-        let along = |step: isize, room: usize| {
-            for distance in 1..=room.min(self.reach) {
-                let label = self.gbuffer.label[pixel.wrapping_add_signed(step * distance as isize)];
-                let own = label == u16::from(self.label);
-                if own != inside && (own || !self.front.iter().any(|&front| u16::from(front) == label)) {
-                    // The outline runs between the two pixel centres.
-                    return Some(distance as f32 - 0.5);
-                }
+        let [columns, rows] = self.grid.pixels(cell);
+        let [left, right] = [columns.start.saturating_sub(self.reach), (columns.end + self.reach).min(width)];
+        let [top, bottom] = [rows.start.saturating_sub(self.reach), (rows.end + self.reach).min(height)];
+        let mut distances = vec![[None; 4]; columns.len() * rows.len()];
+        let pixel = |x: usize, y: usize| (frame as usize * height + y) * width + x;
+        let place = |x: usize, y: usize| (y - rows.start) * columns.len() + x - columns.start;
+        for y in rows.clone() {
+            let (rightward, leftward) = (left..columns.end, (columns.start..right).rev());
+            for (x, distance) in rightward.clone().zip(self.back(rightward.map(|x| pixel(x, y)))).skip(columns.start - left) {
+                distances[place(x, y)][0] = distance;
             }
-            None
-        };
-        let row = width as isize;
-        [along(-1, x), along(1, width - 1 - x), along(-row, y), along(row, height - 1 - y)]
+            for (x, distance) in leftward.clone().zip(self.back(leftward.map(|x| pixel(x, y)))).skip(right - columns.end) {
+                distances[place(x, y)][1] = distance;
+            }
+        }
+        for x in columns.clone() {
+            let (downward, upward) = (top..rows.end, (rows.start..bottom).rev());
+            for (y, distance) in downward.clone().zip(self.back(downward.map(|y| pixel(x, y)))).skip(rows.start - top) {
+                distances[place(x, y)][2] = distance;
+            }
+            for (y, distance) in upward.clone().zip(self.back(upward.map(|y| pixel(x, y)))).skip(bottom - rows.end) {
+                distances[place(x, y)][3] = distance;
+            }
+        }
+        distances
+    }
+
+    /// Along a line of pixels, from each the distance back to where the sheet ends, where it shows, or begins.
+    fn back(&self, line: impl Iterator<Item = usize>) -> impl Iterator<Item = Option<f32>> {
+        // Steps from the last pixel that shows the sheet, and from the last one that shows neither it nor what hides it.
+        let [mut own, mut other] = [usize::MAX; 2];
+        line.map(move |pixel| {
+            [own, other] = [own.saturating_add(1), other.saturating_add(1)];
+            let label = self.gbuffer.label[pixel];
+            let steps = if label == u16::from(self.label) {
+                own = 0;
+                other
+            } else {
+                if !self.front.iter().any(|&front| u16::from(front) == label) {
+                    other = 0;
+                }
+                own
+            };
+            // The outline runs between the two pixel centres.
+            (steps <= self.reach).then(|| steps as f32 - 0.5)
+        })
     }
 }
 
@@ -234,18 +272,19 @@ fn thin_labels(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, labels: usize
                 let frames = grid.frames_of(interval);
                 let frame = frames.start + (frames.end - frames.start) / 2;
                 let look = |label| Look { gbuffer, grid, front: &[], label, reach: THIN * size };
-                let mut longest: Vec<(u8, [f32; 2])> = Vec::new();
-                grid.each_pixel(frame, cell, |pixel, _| {
-                    let Ok(label) = u8::try_from(gbuffer.label[pixel]) else { return };
-                    let [left, right, up, down] = look(label).around(pixel, true);
-                    let run = |a: Option<f32>, b: Option<f32>| a.zip(b).map_or(f32::INFINITY, |(a, b)| a + b);
-                    let runs = [run(left, right), run(up, down)];
-                    match longest.iter_mut().find(|(l, ..)| *l == label) {
-                        Some((_, most)) => *most = [most[0].max(runs[0]), most[1].max(runs[1])],
-                        None => longest.push((label, runs)),
-                    }
-                });
-                for (label, runs) in longest {
+                let mut shown = Vec::new();
+                grid.each_pixel(frame, cell, |pixel, _| shown.push(gbuffer.label[pixel]));
+                let mut found: Vec<u8> = shown.iter().filter_map(|&label| u8::try_from(label).ok()).collect();
+                found.sort_unstable();
+                found.dedup();
+                let run = |a: Option<f32>, b: Option<f32>| a.zip(b).map_or(f32::INFINITY, |(a, b)| a + b);
+                for label in found {
+                    let distances = look(label).around(frame, cell);
+                    let own = distances.iter().zip(&shown).filter(|&(_, &shown)| shown == u16::from(label));
+                    // The longest runs across and down.
+                    let runs = own.fold([0.0f32; 2], |most, (&[left, right, up, down], _)| {
+                        [most[0].max(run(left, right)), most[1].max(run(up, down))]
+                    });
                     let count = &mut counts[usize::from(label)];
                     count[0] += 1;
                     count[1] += u32::from(runs[0] < (THIN * size) as f32);

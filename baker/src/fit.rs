@@ -93,6 +93,9 @@ impl Sums {
 /// Where a layer is known to be, texels, and how sure that is, 0..=1; `None` where nothing is known.
 pub type Prior = Option<([f32; 2], f32)>;
 
+/// What a sheet asks of a pixel: a value there and its weight; `None`: it does not care.
+pub type Target = Option<([f32; 2], f32)>;
+
 /// The target and weight of a pixel, given the value it has, its own target and its weight.
 pub type Refit = fn([f32; 2], [f32; 2], f32) -> ([f32; 2], f32);
 
@@ -114,9 +117,9 @@ pub struct Problem<'a, T> {
     pub known: Option<&'a [[f32; 2]]>,
     /// What a fit after the first asks of a pixel.
     pub refit: Refit,
-    /// The target and weight of a G-buffer pixel for the sheet at a place in the list of its cell (interval times cells plus cell);
-    /// `None`: the sheet does not care.
-    pub target: T,
+    /// Writes what the sheets in the list of a cell (interval times cells plus cell) ask of its pixels in a frame: for every pixel, in the order of
+    /// [`KeyGrid::each_pixel`], all sheets. Nothing where no sheet asks anything.
+    pub targets: T,
 }
 
 /// Fitted positions.
@@ -131,15 +134,17 @@ pub struct Fit {
 /// Fits the positions of all layers.
 #[must_use]
 pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers, prior: &[Prior]) -> Fit {
-    let target = |index: usize, sheet: usize, pixel: usize| {
-        let own = gbuffer.label[pixel] == u16::from(sheets.lists[index][sheet]);
-        own.then(|| (gbuffer.uv[pixel], 1.0))
+    let targets = |index: usize, frame: u32, targets: &mut Vec<Target>| {
+        grid.each_pixel(frame, index % grid.grid.cells(), |pixel, _| {
+            let own = |&label: &u8| (gbuffer.label[pixel] == u16::from(label)).then(|| (gbuffer.uv[pixel], 1.0));
+            targets.extend(sheets.lists[index].iter().map(own));
+        });
     };
     let problem =
-        Problem { grid, sheets, layers, time: grid.time, space: grid.space, prior: Some(prior), known: None, refit: robust, target };
+        Problem { grid, sheets, layers, time: grid.time, space: grid.space, prior: Some(prior), known: None, refit: robust, targets };
     let mut fit = solve_for(&problem);
     for _ in 0..REFITS {
-        fit = solve_for(&Problem { known: Some(&fit.uv), target, ..problem });
+        fit = solve_for(&Problem { known: Some(&fit.uv), targets, ..problem });
     }
     fit
 }
@@ -153,7 +158,7 @@ fn robust([a, b]: [f32; 2], [u, v]: [f32; 2], weight: f32) -> ([f32; 2], f32) {
 #[must_use]
 pub fn solve_for<T>(problem: &Problem<'_, T>) -> Fit
 where
-    T: Fn(usize, usize, usize) -> Option<([f32; 2], f32)> + Sync,
+    T: Fn(usize, u32, &mut Vec<Target>) + Sync,
 {
     let System { elements, mut right, mut diagonal, mut start } = assemble(problem);
     if let Some(known) = problem.known {
@@ -214,7 +219,7 @@ struct Assembled {
 
 fn assemble<T>(problem: &Problem<'_, T>) -> System
 where
-    T: Fn(usize, usize, usize) -> Option<([f32; 2], f32)> + Sync,
+    T: Fn(usize, u32, &mut Vec<Target>) + Sync,
 {
     let cells = problem.grid.grid.cells();
     let layers = problem.layers.label.len();
@@ -247,7 +252,7 @@ where
 /// The elements of all sheets of one cell and interval.
 fn assemble_cell<T>(problem: &Problem<'_, T>, index: usize) -> Vec<Assembled>
 where
-    T: Fn(usize, usize, usize) -> Option<([f32; 2], f32)> + Sync,
+    T: Fn(usize, u32, &mut Vec<Target>) + Sync,
 {
     let grid = problem.grid;
     let place = [index / grid.grid.cells(), index % grid.grid.cells()];
@@ -259,14 +264,19 @@ where
     let patches: Vec<Patch> = list.iter().map(patch).collect();
     let mut assembled: Vec<Assembled> = patches.iter().map(|patch| Assembled::new(patch, place[0], volume)).collect();
     let mut sums = vec![Vec::with_capacity(frames.len()); list.len()];
+    let mut targets = Vec::new();
     for frame in frames {
+        targets.clear();
+        (problem.targets)(index, frame, &mut targets);
+        let mut targets = targets.chunks_exact(list.len());
         let weights = grid.weights(place[0], frame, problem.time);
         let known: Option<Vec<AtPoints>> = problem.known.map(|known| patches.iter().map(|patch| patch.points(known, &weights)).collect());
         let mut frame_sums = vec![(Sums::default(), [[0.0f32; 2]; POINTS], [0.0f32; 3]); list.len()];
-        grid.each_pixel(frame, place[1], |pixel, at| {
+        grid.each_pixel(frame, place[1], |_, at| {
+            let Some(targets) = targets.next() else { return };
             let (points, shares) = patch::around(at);
-            for (sheet, (sums, right, seen)) in frame_sums.iter_mut().enumerate() {
-                let Some(([mut u, mut v], mut weight)) = (problem.target)(index, sheet, pixel) else { continue };
+            for (sheet, ((sums, right, seen), target)) in frame_sums.iter_mut().zip(targets).enumerate() {
+                let Some(([mut u, mut v], mut weight)) = *target else { continue };
                 if let Some(known) = &known {
                     ([u, v], weight) = (problem.refit)(patch::value(&known[sheet], (points, shares)), [u, v], weight);
                 }
