@@ -241,7 +241,7 @@ impl Look<'_> {
                 own
             };
             // The outline runs between the two pixel centres.
-            (steps <= self.reach).then(|| steps as f32 - 0.5)
+            (steps <= self.reach).then_some(steps as f32 - 0.5)
         })
     }
 }
