@@ -48,9 +48,7 @@ type Distances = [Option<f32>; 4];
 pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers, labels: usize) -> Fields {
     let thin = thin_labels(gbuffer, grid, sheets, labels);
     let outlines = Outlines { gbuffer, grid, sheets, layers, thin: &thin };
-    let first =
-        fit::solve_for(&outlines.problem(None, |index, frame, targets: &mut Vec<Target>| outlines.targets(index, frame, false, targets)))
-            .uv;
+    let first = fit::solve_for(&outlines.problem(None, false)).uv;
     let distance = outlines.refit(first, false);
     Fields { distance, thin }
 }
@@ -96,21 +94,27 @@ struct Outlines<'a> {
 }
 
 impl<'a> Outlines<'a> {
-    fn problem<T>(&self, known: Option<&'a [[f32; 2]]>, targets: T) -> Problem<'a, T> {
+    /// To fit the fields of those sheets that are tested by them, or of all.
+    fn problem<'s>(
+        &'s self,
+        known: Option<&'s [[f32; 2]]>,
+        tested: bool,
+    ) -> Problem<'s, impl Fn(usize, u32, &mut Vec<Target>) + Sync + use<'s, 'a>> {
         let &Outlines { grid, sheets, layers, .. } = self;
+        let targets = move |index: usize, frame: u32, targets: &mut Vec<Target>| self.targets(index, frame, tested, targets);
         Problem { grid, sheets, layers, time: TIME_LINEAR, space: SPACE_LINEAR, prior: None, known, refit: hinge, targets }
     }
 
-    /// `fields` after a few refits, to those sheets only that are tested or to all, as the player will have them.
+    /// `fields` after a few refits, as the player will have them.
     fn refit(&self, mut fields: Vec<[f32; 2]>, tested: bool) -> Vec<[f32; 2]> {
-        let targets = |index: usize, frame: u32, targets: &mut Vec<Target>| self.targets(index, frame, tested, targets);
         for _ in 0..REFITS {
-            fields = fit::solve_for(&Outlines { ..*self }.problem(Some(&fields), targets)).uv;
+            let fit = fit::solve_for(&self.problem(Some(&fields), tested));
+            fields = fit.uv;
         }
         fields.iter().map(|pair| pair.map(|field| distance(code(field)))).collect()
     }
 
-    /// What the sheets of a cell and interval ask of its pixels in a frame; of sheets that are tested by their fields, or of all.
+    /// What the sheets of a cell and interval ask of its pixels in a frame: those that are tested by their fields, or all.
     fn targets(&self, index: usize, frame: u32, tested: bool, targets: &mut Vec<Target>) {
         let &Outlines { gbuffer, grid, .. } = self;
         let list = &self.sheets.lists[index];
@@ -201,48 +205,41 @@ impl Look<'_> {
         let [left, right] = [columns.start.saturating_sub(self.reach), (columns.end + self.reach).min(width)];
         let [top, bottom] = [rows.start.saturating_sub(self.reach), (rows.end + self.reach).min(height)];
         let mut distances = vec![[None; 4]; columns.len() * rows.len()];
-        let pixel = |x: usize, y: usize| (frame as usize * height + y) * width + x;
-        let place = |x: usize, y: usize| (y - rows.start) * columns.len() + x - columns.start;
+        let at = |x: usize, y: usize| {
+            let within = columns.contains(&x) && rows.contains(&y);
+            ((frame as usize * height + y) * width + x, within.then(|| (y - rows.start) * columns.len() + x - columns.start))
+        };
         for y in rows.clone() {
-            let (rightward, leftward) = (left..columns.end, (columns.start..right).rev());
-            for (x, distance) in rightward.clone().zip(self.back(rightward.map(|x| pixel(x, y)))).skip(columns.start - left) {
-                distances[place(x, y)][0] = distance;
-            }
-            for (x, distance) in leftward.clone().zip(self.back(leftward.map(|x| pixel(x, y)))).skip(right - columns.end) {
-                distances[place(x, y)][1] = distance;
-            }
+            self.sweep((left..columns.end).map(|x| at(x, y)), 0, &mut distances);
+            self.sweep((columns.start..right).rev().map(|x| at(x, y)), 1, &mut distances);
         }
         for x in columns.clone() {
-            let (downward, upward) = (top..rows.end, (rows.start..bottom).rev());
-            for (y, distance) in downward.clone().zip(self.back(downward.map(|y| pixel(x, y)))).skip(rows.start - top) {
-                distances[place(x, y)][2] = distance;
-            }
-            for (y, distance) in upward.clone().zip(self.back(upward.map(|y| pixel(x, y)))).skip(bottom - rows.end) {
-                distances[place(x, y)][3] = distance;
-            }
+            self.sweep((top..rows.end).map(|y| at(x, y)), 2, &mut distances);
+            self.sweep((rows.start..bottom).rev().map(|y| at(x, y)), 3, &mut distances);
         }
         distances
     }
 
-    /// Along a line of pixels, from each the distance back to where the sheet ends, where it shows, or begins.
-    fn back(&self, line: impl Iterator<Item = usize>) -> impl Iterator<Item = Option<f32>> {
+    /// Goes along a line of pixels and writes how far back the sheet ends, where it shows, or begins: the distance on one side of those that have
+    /// a place in the cell.
+    fn sweep(&self, line: impl Iterator<Item = (usize, Option<usize>)>, side: usize, distances: &mut [Distances]) {
         // Steps from the last pixel that shows the sheet, and from the last one that shows neither it nor what hides it.
         let [mut own, mut other] = [usize::MAX; 2];
-        line.map(move |pixel| {
+        for (pixel, place) in line {
             [own, other] = [own.saturating_add(1), other.saturating_add(1)];
             let label = self.gbuffer.label[pixel];
-            let steps = if label == u16::from(self.label) {
+            let inside = label == u16::from(self.label);
+            if let Some(place) = place {
+                let steps = if inside { other } else { own };
+                // The outline runs between the two pixel centres.
+                distances[place][side] = (steps <= self.reach).then_some(steps as f32 - 0.5);
+            }
+            if inside {
                 own = 0;
-                other
-            } else {
-                if !self.front.iter().any(|&front| u16::from(front) == label) {
-                    other = 0;
-                }
-                own
-            };
-            // The outline runs between the two pixel centres.
-            (steps <= self.reach).then_some(steps as f32 - 0.5)
-        })
+            } else if !self.front.iter().any(|&front| u16::from(front) == label) {
+                other = 0;
+            }
+        }
     }
 }
 
