@@ -57,7 +57,9 @@ impl Chart {
         self.flags & STRIP as u32 != 0
     }
 
-    const fn masked(&self) -> bool {
+    /// The chart does not fill its rectangle: the mask says where it is.
+    #[must_use]
+    pub const fn masked(&self) -> bool {
         self.flags & MASKED as u32 != 0
     }
 
@@ -69,25 +71,77 @@ impl Chart {
         inside && (!self.masked() || texture.covered(uv))
     }
 
-    /// How much the chart covers of what lies between `points`, with some room for rounding.
+    /// How much the chart covers of what lies within `bounds`, with some room for rounding.
     #[must_use]
     #[inline]
-    pub fn cover<const N: usize>(&self, points: &[PlayUv; N]) -> Cover {
-        // Q16 texels.
-        const SLACK: i32 = 64;
-        let (mut low, mut high) = ([i32::MAX; 2], [i32::MIN; 2]);
-        for uv in points {
-            low = [low[0].min(uv.u), low[1].min(uv.v)];
-            high = [high[0].max(uv.u), high[1].max(uv.v)];
-        }
+    pub fn cover(&self, &Bounds { low, high }: &Bounds) -> Cover {
         let (left, right) = (self.left.wrapping_sub(SLACK), self.right.wrapping_add(SLACK));
         let (top, bottom) = (self.top.wrapping_sub(SLACK), self.bottom.wrapping_add(SLACK));
-        if high[0] < left || low[0] >= right || high[1] < top || low[1] >= bottom {
+        if high.u < left || low.u >= right || high.v < top || low.v >= bottom {
             return Cover::Nothing;
         }
         const TWICE: i32 = 2 * SLACK;
-        let across = low[0] >= left.wrapping_add(TWICE) && high[0] < right.wrapping_sub(TWICE);
-        let down = low[1] >= top.wrapping_add(TWICE) && high[1] < bottom.wrapping_sub(TWICE);
+        let across = low.u >= left.wrapping_add(TWICE) && high.u < right.wrapping_sub(TWICE);
+        let down = low.v >= top.wrapping_add(TWICE) && high.v < bottom.wrapping_sub(TWICE);
         if across && down && !self.masked() { Cover::All } else { Cover::Part }
     }
+
+    /// Those of the rectangle's edges that what lies between the corners of a block, within `bounds`, may cross.
+    #[must_use]
+    #[inline]
+    pub fn edges(&self, corners: &[PlayUv; 4], &Bounds { low, high }: &Bounds) -> [Option<Edge>; 4] {
+        let (across, down) = (corners.map(|uv| uv.u), corners.map(|uv| uv.v));
+        let lower = |corners: [i32; 4], low: i32, at: i32| (low < at.wrapping_add(SLACK)).then_some(Edge { corners, at, upper: false });
+        let upper = |corners: [i32; 4], high: i32, at: i32| (high >= at.wrapping_sub(SLACK)).then_some(Edge { corners, at, upper: true });
+        [lower(across, low.u, self.left), upper(across, high.u, self.right), lower(down, low.v, self.top), upper(down, high.v, self.bottom)]
+    }
 }
+
+/// An upright rectangle of the source image.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds {
+    /// Its left upper corner,
+    pub low: PlayUv,
+    /// and the right lower one, inclusive.
+    pub high: PlayUv,
+}
+
+impl Bounds {
+    /// Around nothing.
+    pub const NOTHING: Self = Self { low: PlayUv { u: i32::MAX, v: i32::MAX }, high: PlayUv { u: i32::MIN, v: i32::MIN } };
+
+    /// Around two positions.
+    #[must_use]
+    #[inline(always)]
+    pub fn of(a: PlayUv, b: PlayUv) -> Self {
+        Self { low: PlayUv { u: a.u.min(b.u), v: a.v.min(b.v) }, high: PlayUv { u: a.u.max(b.u), v: a.v.max(b.v) } }
+    }
+
+    /// Around both.
+    #[must_use]
+    #[inline(always)]
+    pub fn join(self, other: Self) -> Self {
+        Self { low: Self::of(self.low, other.low).low, high: Self::of(self.high, other.high).high }
+    }
+
+    /// Around a block's corners.
+    #[must_use]
+    #[inline(always)]
+    pub fn around(&[a, b, c, d]: &[PlayUv; 4]) -> Self {
+        Self::of(a, b).join(Self::of(c, d))
+    }
+}
+
+/// An edge of a chart's rectangle, and one coordinate of a block's corners beside it.
+#[derive(Clone, Copy, Debug)]
+pub struct Edge {
+    /// The coordinate above left and right, below left and right, Q16 texels.
+    pub corners: [i32; 4],
+    /// Where the edge is.
+    pub at: i32,
+    /// The chart is below it; else from it on.
+    pub upper: bool,
+}
+
+/// Rounding moves positions by less than this, Q16 texels.
+const SLACK: i32 = 64;

@@ -1,20 +1,21 @@
 //! Draws rows of pixels: plans a strip when its first row is asked for, then runs and mixed blocks of one row after the other.
-//! The plan is in the caller's memory; pixels go to the caller's row, as `player` asks.
+//! The plan is in the caller's memory; pixels go to the caller's row, as `player` asks. What fits no plan is drawn pixel by pixel.
 
 use crate::Bundle;
 use crate::fixed::PlayUv;
 use crate::lists::{CHART, FIELD};
 use crate::memory::Workspace;
-use crate::plan::{Mixed, Plan, Run, Site, TILE_LOG2, Tile};
+use crate::plan::{Plan, Run};
+use crate::site::Site;
 use crate::span::{self, Field, Packed, Span};
+use crate::torn::{Mixed, Side};
+use crate::window::{TILE_LOG2, Tile};
 use crate::work::{Probe, Work};
 
 /// What pixels are made of positions.
 pub trait Paint {
     /// A pixel.
     type Pixel: Copy + Default;
-    /// Drawn for every frame, so that loops for the usual sizes of blocks are worth their code.
-    const OFTEN: bool;
 
     /// How far around a position pixels are told from, Q16 texels.
     const REACH: i32;
@@ -22,8 +23,18 @@ pub trait Paint {
     /// The pixel at `uv`, which is inside the picture; `x`: whether it is an odd one of its row.
     fn at(&self, uv: PlayUv, label: u8, x: usize) -> Self::Pixel;
 
-    /// A run's pixels, in windows of 2^ROWS rows of 2^WIDTH texels, `TEXELS` in all; `log2`: of a tile's pixels.
-    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, tiles: &mut [Tile], out: &mut [Self::Pixel], log2: u32);
+    /// Row `row` of a run's pixels, in windows of 2^ROWS rows of 2^WIDTH texels, `TEXELS` in all; `log2`: of a tile's pixels.
+    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
+        &self,
+        run: Run,
+        tiles: &[Tile],
+        row: u32,
+        out: &mut [Self::Pixel],
+        log2: u32,
+    );
+
+    /// What row `row` of a mixed block shows of one of its sides, in such a window.
+    fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, row: u32, out: &mut [Self::Pixel]);
 }
 
 /// Where pixels come from.
@@ -32,16 +43,27 @@ pub struct Probes;
 
 impl Paint for Probes {
     type Pixel = Probe;
-    const OFTEN: bool = false;
     const REACH: i32 = 0;
 
     fn at(&self, uv: PlayUv, label: u8, _: usize) -> Probe {
         Probe { label, at: uv }
     }
 
-    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, tiles: &mut [Tile], out: &mut [Probe], log2: u32) {
+    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
+        &self,
+        run: Run,
+        tiles: &[Tile],
+        row: u32,
+        out: &mut [Probe],
+        log2: u32,
+    ) {
         let label = run.label as u8;
-        span::any_run(tiles, out, log2, [0; 2], |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(run.row) });
+        span::any_run(tiles, row, out, log2, [0; 2], |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(run.row) });
+    }
+
+    fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, row: u32, out: &mut [Probe]) {
+        let label = side.label as u8;
+        span::part(&side.tile, row, side.shown.row(row), out, [0; 2], |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(side.row) });
     }
 }
 
@@ -66,43 +88,63 @@ impl<'d, 'a> Drawing<'d, 'a> {
     /// Draws pixel row `y`, which lies in the row of cells.
     #[inline(always)]
     pub fn row<P: Paint>(&mut self, y: u32, out: &mut [P::Pixel], work: &mut Work, paint: &P) {
-        let out = self.runs(y, out, work, paint);
-        // Cells of eight pixels, whole or by quarters, are the rule; with numbers that are known the code is a third shorter to run.
-        match (self.site.log2(), self.site.bundle.grid().log2) {
-            (2, 3) if P::OFTEN => mix::<P, 2>(&self.site, self.mixed(), y, out, paint),
-            (3, 3) if P::OFTEN => mix::<P, 3>(&self.site, self.mixed(), y, out, paint),
-            _ => mix::<P, ANY>(&self.site, self.mixed(), y, out, paint),
+        let out = self.runs(y, out, work, paint, false);
+        match self.site.bundle.texture().width_log2 {
+            8 => self.mix::<P, 8, 5>(y, out, paint),
+            9 => self.mix::<P, 9, 5>(y, out, paint),
+            _ => self.mix::<P, 10, 4>(y, out, paint),
         }
     }
 
-    /// Draws the runs of pixel row `y`. What there is of `out` on the screen comes back: its mixed blocks are still to be drawn.
+    /// Draws the runs of pixel row `y`. What there is of `out` on the screen comes back: its mixed blocks are still to be drawn; `sideless`: all of them
+    /// pixel by pixel.
     #[inline(always)]
-    fn runs<'o, P: Paint>(&mut self, y: u32, out: &'o mut [P::Pixel], work: &mut Work, paint: &P) -> &'o mut [P::Pixel] {
+    fn runs<'o, P: Paint>(&mut self, y: u32, out: &'o mut [P::Pixel], work: &mut Work, paint: &P, sideless: bool) -> &'o mut [P::Pixel] {
         let log2 = self.site.tile_log2();
         let (strip, row) = (y >> log2, y & (1u32 << log2).wrapping_sub(1));
-        if self.plan.strip != Some(strip) || self.plan.row > row || self.plan.reach != P::REACH {
-            self.plan.make(&self.site, strip, P::REACH);
+        let plan = &*self.plan;
+        if plan.strip != Some(strip) || plan.reach != P::REACH || plan.sideless != sideless {
+            self.plan.make(&self.site, strip, P::REACH, sideless);
         }
-        self.plan.skip_to(row);
         let width = self.site.bundle.size().0 as usize;
         let drawn = out.len().min(width);
         let out = out.get_mut(..drawn).unwrap_or(&mut []);
-        let Plan { tile, run: runs, runs: count, .. } = &mut *self.plan;
+        let Plan { tile, run: runs, runs: count, .. } = &*self.plan;
         for &run in runs.get(..*count).unwrap_or(&[]) {
             let first = usize::from(run.tile);
-            let Some(tiles) = tile.get_mut(first..first.wrapping_add(run.count.into())) else { continue };
+            let Some(tiles) = tile.get(first..first.wrapping_add(run.count.into())) else { continue };
             let from = usize::from(run.place).wrapping_shl(log2);
             let to = usize::from(run.place).wrapping_add(run.count.into()).wrapping_shl(log2);
             match out.get_mut(from..to) {
-                Some(pixels) => by_width(paint, run, tiles, pixels, log2, self.site.bundle.texture().width_log2),
-                None => cut(paint, run, tiles, out, log2, self.site.bundle.texture().width_log2),
+                Some(pixels) => by_width(paint, run, tiles, row, pixels, log2, self.site.bundle.texture().width_log2),
+                None => cut(paint, run, tiles, row, out, log2, self.site.bundle.texture().width_log2),
             }
         }
-        self.plan.row = row.wrapping_add(1);
         work.smooth_pixels = work.smooth_pixels.wrapping_add(self.plan.smooth);
         work.torn_pixels = work.torn_pixels.wrapping_add(self.plan.torn);
         work.coverage_tests = work.coverage_tests.wrapping_add(self.plan.tests);
         out
+    }
+
+    /// Draws the mixed blocks of pixel row `y`.
+    #[inline(never)]
+    fn mix<P: Paint, const WIDTH: u32, const ROWS: u32>(&self, y: u32, out: &mut [P::Pixel], paint: &P) {
+        let log2 = self.site.log2();
+        let row = y & (1u32 << log2).wrapping_sub(1);
+        for side in self.plan.side.get(..self.plan.sides).unwrap_or(&[]) {
+            if side.shown.row(row) != 0
+                && let Some(pixels) = pixels(side.block, out, log2)
+            {
+                paint.side::<WIDTH, ROWS>(side, row, pixels);
+            }
+        }
+        // Most often there is none.
+        if self.plan.plain > 0 {
+            for mixed in self.mixed().iter().filter(|mixed| mixed.sides == 0) {
+                let Some(pixels) = pixels(mixed.block, out, log2) else { break };
+                block(&self.site, *mixed, y, pixels, paint, None);
+            }
+        }
     }
 
     /// The strip's mixed blocks.
@@ -114,18 +156,18 @@ impl<'d, 'a> Drawing<'d, 'a> {
     /// centre both ways.
     pub fn smooth<P: Paint>(&mut self, y: u32, out: &mut [P::Pixel], work: &mut Work, paint: &P, mean: impl Fn([P::Pixel; 4]) -> P::Pixel) {
         let log2 = self.site.log2();
-        let out = self.runs(y, out, work, paint);
+        let out = self.runs(y, out, work, paint, true);
         for mixed in self.mixed() {
-            let Some(pixels) = mixed.pixels(out, log2) else { break };
+            let Some(pixels) = pixels(mixed.block, out, log2) else { break };
             // One sheet has no outlines here: it is only that its positions fit no window.
             if mixed.sheets.is_power_of_two() {
-                any_block(&self.site, *mixed, y, pixels, paint);
+                block(&self.site, *mixed, y, pixels, paint, None);
                 continue;
             }
             let mut samples = [[P::Pixel::default(); 32]; 4];
             for (samples, beside) in samples.iter_mut().zip([[-1, -1], [1, -1], [-1, 1], [1, 1]]) {
                 if let Some(samples) = samples.get_mut(..pixels.len()) {
-                    block::<P, ANY>(&self.site, *mixed, y, samples, paint, Some(beside));
+                    block(&self.site, *mixed, y, samples, paint, Some(beside));
                 }
             }
             let [a, b, c, d] = &samples;
@@ -138,37 +180,32 @@ impl<'d, 'a> Drawing<'d, 'a> {
     }
 }
 
-impl Mixed {
-    /// The block's pixels in a row of them; `None` past its end.
-    #[inline(always)]
-    fn pixels<'o, T>(&self, row: &'o mut [T], log2: u32) -> Option<&'o mut [T]> {
-        let first = usize::from(self.block).wrapping_shl(log2);
-        let last = first.wrapping_add(1 << log2).min(row.len());
-        row.get_mut(first..last)
-    }
+/// The pixels of block `block` in a row of them; `None` past its end.
+#[inline(always)]
+fn pixels<T>(block: u16, row: &mut [T], log2: u32) -> Option<&mut [T]> {
+    let first = usize::from(block).wrapping_shl(log2);
+    let last = first.wrapping_add(1 << log2).min(row.len());
+    row.get_mut(first..last)
 }
 
-/// A run's pixels by the width of the picture: those that `plan` has windows for.
+/// Row `row` of a run's pixels by the width of the picture: those that `window` knows.
 #[inline(never)]
-fn by_width<P: Paint>(paint: &P, run: Run, tiles: &mut [Tile], out: &mut [P::Pixel], log2: u32, width_log2: u32) {
+fn by_width<P: Paint>(paint: &P, run: Run, tiles: &[Tile], row: u32, out: &mut [P::Pixel], log2: u32, width_log2: u32) {
     match width_log2 {
-        8 => paint.run::<8, 5, 0x2000>(run, tiles, out, log2),
-        9 => paint.run::<9, 5, 0x4000>(run, tiles, out, log2),
-        _ => paint.run::<10, 4, 0x4000>(run, tiles, out, log2),
+        8 => paint.run::<8, 5, 0x2000>(run, tiles, row, out, log2),
+        9 => paint.run::<9, 5, 0x4000>(run, tiles, row, out, log2),
+        _ => paint.run::<10, 4, 0x4000>(run, tiles, row, out, log2),
     }
 }
 
 /// A run that reaches past the end of `out`: tile by tile, and of the last only what there is.
 #[inline(never)]
-fn cut<P: Paint>(paint: &P, run: Run, tiles: &mut [Tile], out: &mut [P::Pixel], log2: u32, width_log2: u32) {
+fn cut<P: Paint>(paint: &P, run: Run, tiles: &[Tile], row: u32, out: &mut [P::Pixel], log2: u32, width_log2: u32) {
     let from = usize::from(run.place).wrapping_shl(log2);
-    let mut out = out.get_mut(from..).unwrap_or(&mut []);
-    for tile in tiles {
-        let (pixels, rest) = out.split_at_mut(out.len().min(1 << log2));
-        out = rest;
+    for (tile, pixels) in tiles.iter().zip(out.get_mut(from..).unwrap_or(&mut []).chunks_mut(1 << log2)) {
         let mut whole = [P::Pixel::default(); 1 << TILE_LOG2];
         if let Some(made) = whole.get_mut(..1 << log2) {
-            by_width(paint, run, core::slice::from_mut(tile), made, log2, width_log2);
+            by_width(paint, run, core::slice::from_ref(tile), row, made, log2, width_log2);
         }
         for (pixel, made) in pixels.iter_mut().zip(whole) {
             *pixel = made;
@@ -176,49 +213,14 @@ fn cut<P: Paint>(paint: &P, run: Run, tiles: &mut [Tile], out: &mut [P::Pixel], 
     }
 }
 
-/// No number of pixels in particular, as the logarithm of a block's side.
-const ANY: u32 = u32::MAX;
-
-/// Mixed blocks pixel by pixel. LOG2: they are 2^LOG2 pixels wide, cells of eight or their quarters; or [`ANY`].
-#[inline(never)]
-fn mix<P: Paint, const LOG2: u32>(site: &Site<'_, '_, '_>, mixed: &[Mixed], y: u32, out: &mut [P::Pixel], paint: &P) {
-    let log2 = if LOG2 == ANY { site.log2() } else { LOG2 };
-    for mixed in mixed {
-        let Some(pixels) = mixed.pixels(out, log2) else { break };
-        // The most frequent lengths have loops of their own.
-        match LOG2 {
-            2 if let Ok(four) = <&mut [P::Pixel; 4]>::try_from(&mut *pixels) => block::<P, LOG2>(site, *mixed, y, four, paint, None),
-            3 if let Ok(eight) = <&mut [P::Pixel; 8]>::try_from(&mut *pixels) => block::<P, LOG2>(site, *mixed, y, eight, paint, None),
-            _ => any_block(site, *mixed, y, pixels, paint),
-        }
-    }
-}
-
-/// A block of any length.
-#[inline(never)]
-fn any_block<P: Paint>(site: &Site<'_, '_, '_>, mixed: Mixed, y: u32, pixels: &mut [P::Pixel], paint: &P) {
-    block::<P, ANY>(site, mixed, y, pixels, paint, None);
-}
-
 /// One mixed block, front to back: the frontmost sheet that covers a pixel shows; at pixels' centres, or `beside` them, quarters of a
 /// pixel across and down.
-#[inline(always)]
-fn block<P: Paint, const LOG2: u32>(
-    site: &Site<'_, '_, '_>,
-    mixed: Mixed,
-    y: u32,
-    pixels: &mut [P::Pixel],
-    paint: &P,
-    beside: Option<[i32; 2]>,
-) {
-    let (log2, cell) = if LOG2 == ANY { (site.log2(), site.bundle.grid().log2) } else { (LOG2, 3) };
+#[inline(never)]
+fn block<P: Paint>(site: &Site<'_, '_, '_>, mixed: Mixed, y: u32, pixels: &mut [P::Pixel], paint: &P, beside: Option<[i32; 2]>) {
+    let (log2, cell) = (site.log2(), site.bundle.grid().log2);
     let row = y & (1u32 << log2).wrapping_sub(1);
     let texture = site.texture;
-    let block = match LOG2 {
-        2 => site.quarter(mixed.block.into(), y >> log2),
-        3 => site.whole(),
-        _ => site.block(mixed.block.into(), y >> log2),
-    };
+    let block = site.block(mixed.block.into(), y >> log2);
     let mut left = u32::MAX.wrapping_shr(32u32.wrapping_sub(pixels.len() as u32));
     let mut sheets = mixed.sheets;
     while sheets != 0 && left != 0 {

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// What a bundle starts with.
 pub const MAGIC: [u8; 6] = *b"CUBIST";
 /// The format's version.
-pub const VERSION: u16 = 3;
+pub const VERSION: u16 = 4;
 /// The most sections a bundle can hold.
 pub const MAX_SECTIONS: usize = 16;
 /// The most sheets a cell can hold: the tests of all but the last fit into 16 bits.
@@ -273,7 +273,7 @@ pub struct Limits {
     pub row_chains: u16,
     /// Layers of a key in chains that some cell tests.
     pub key_fields: u16,
-    /// Bytes of a key interval's sheet lists, as [`crate::lists::bytes`] counts them.
+    /// Bytes of a key interval's sheet lists, as [`crate::lists::row_bytes`] counts them.
     pub list_bytes: u16,
     /// Sheets in a row of cells.
     pub row_sheets: u16,

@@ -115,9 +115,12 @@ mod predict;
 pub mod record;
 mod row;
 mod sheet;
+mod site;
 mod span;
 mod texels;
 pub mod timeline;
+mod torn;
+mod window;
 mod work;
 
 pub use bundle::{Bundle, checksum};

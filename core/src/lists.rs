@@ -23,6 +23,13 @@ pub const FIELD: u16 = 1;
 /// The sheet shows where both tests say so.
 pub const BOTH: u16 = 2;
 
+impl Sheets {
+    /// Those of a cell of one label.
+    fn single(label: u8) -> Self {
+        Self { labels: Vec::from_slice(&[label]).unwrap_or_default(), tests: 0 }
+    }
+}
+
 /// The sheets of one cell, borrowed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SheetsRef<'l> {
@@ -45,6 +52,8 @@ impl SheetsRef<'_> {
 const POOL: usize = 16;
 /// Flags "the same list as the next neighbour": neighbour x agreement of the neighbours x torn or not.
 const SAME: usize = 5 * 8 * 2;
+/// The one of them where all neighbours have one and the same label.
+const SAME_ALL: usize = 7 * 2 * 5;
 /// Flags "one more sheet".
 const COUNT: usize = MAX_SHEETS;
 /// Flags "this label of the pool": place in the list x place in the pool.
@@ -54,8 +63,8 @@ const TEST: usize = 2;
 /// Contexts the lists are coded with.
 pub const CONTEXTS: usize = SAME + COUNT + PICK + TEST;
 
-/// The sheet lists of one key interval, in caller's memory: a byte of length, the labels and, where there is more
-/// than one, two bytes of tests, cell after cell.
+/// The sheet lists of one key interval, in caller's memory, cell after cell: a byte of how many labels ([`COUNT_BITS`] of it) and how many more cells of
+/// the row go on with them, the labels and, where there is more than one, two bytes of tests. Only cells of one label go on: most do.
 #[derive(Debug, Default)]
 pub struct Lists<'m> {
     /// Where each row of cells starts in `data`; one entry more than rows.
@@ -81,69 +90,144 @@ impl<'m> Lists<'m> {
     #[must_use]
     pub fn row(&self, row: usize) -> Cursor {
         let inside = row.wrapping_add(1) < self.rows.len();
-        Cursor { at: self.rows.get(row).filter(|_| inside).map_or(usize::MAX, |&at| usize::from(at)) }
+        Cursor { at: self.rows.get(row).filter(|_| inside).map_or(usize::MAX, |&at| usize::from(at)), along: 0 }
     }
 
     /// The sheets at `cursor`; empty where there is no cell.
     #[must_use]
     pub fn sheets(&self, cursor: Cursor) -> SheetsRef<'_> {
-        let Some((&count, rest)) = self.data.get(cursor.at..).and_then(<[u8]>::split_first) else { return SheetsRef::default() };
-        let Some((labels, rest)) = rest.split_at_checked(usize::from(count)) else { return SheetsRef::default() };
-        let tests = rest.first_chunk().filter(|_| count > 1).map_or(0, |bytes| u16::from_le_bytes(*bytes));
+        let Some((&head, rest)) = self.data.get(cursor.at..).and_then(<[u8]>::split_first) else { return SheetsRef::default() };
+        let Some((labels, rest)) = rest.split_at_checked(labels_of(head)) else { return SheetsRef::default() };
+        let tests = rest.first_chunk().filter(|_| labels.len() > 1).map_or(0, |bytes| u16::from_le_bytes(*bytes));
         SheetsRef { labels, tests }
+    }
+
+    /// The label at `cursor`, where it is the only one.
+    #[inline(always)]
+    fn single(&self, cursor: Cursor) -> Option<u8> {
+        let &[head, label] = self.data.get(cursor.at..)?.first_chunk()?;
+        (labels_of(head) == 1).then_some(label)
+    }
+
+    /// A cursor at cell `column` of `row`; past the last row one that sees no sheets.
+    fn cell(&self, row: usize, column: usize) -> Cursor {
+        let mut cursor = self.row(row);
+        let mut left = column;
+        while left > 0
+            && let Some(&head) = self.data.get(cursor.at)
+        {
+            let cells = left_of(head, cursor).min(left);
+            (cursor, left) = (cursor.on(head, cells), left.wrapping_sub(cells));
+        }
+        cursor
     }
 
     /// How many cells from `cursor` on list `label` and no other, `most` at most, and where the one after them is.
     #[must_use]
     pub fn alike(&self, cursor: Cursor, label: u8, most: usize) -> (usize, Cursor) {
-        let (cells, _) = self.data.get(cursor.at..).unwrap_or(&[]).as_chunks::<2>();
-        let alike = cells.iter().take(most).take_while(|&&cell| cell == [1, label]).count();
-        (alike, Cursor { at: cursor.at.saturating_add(alike.saturating_mul(bytes(1))) })
+        let (mut alike, mut cursor) = (0usize, cursor);
+        while let Some(&[head, first]) = self.data.get(cursor.at..).and_then(<[u8]>::first_chunk)
+            && labels_of(head) == 1
+            && first == label
+            && alike < most
+        {
+            let cells = left_of(head, cursor).min(most.wrapping_sub(alike));
+            alike = alike.wrapping_add(cells);
+            cursor = cursor.on(head, cells);
+        }
+        (alike, cursor)
     }
 
-    fn push(&mut self, end: usize, sheets: &Sheets) -> usize {
+    /// Appends the list of a cell, to the right of that at `west`, where lists end at `end`; returns where it is, and where they end now.
+    fn push(&mut self, west: Cursor, end: usize, sheets: &Sheets) -> (Cursor, usize) {
         let labels = sheets.labels.get(..self.most).unwrap_or(&sheets.labels);
+        let before = self.data.get_mut(west.at..).and_then(<[u8]>::first_chunk_mut);
+        if let Some([head, label]) = before
+            && let &[same] = labels
+            && labels_of(*head) == 1
+            && *label == same
+            && more_of(*head) < MOST_MORE
+        {
+            *head = head.wrapping_add(1 << COUNT_BITS);
+            return (west, end);
+        }
         let next = end.saturating_add(bytes(labels.len()));
-        let Some((count, rest)) = self.data.get_mut(end..next).and_then(<[u8]>::split_first_mut) else {
+        let Some((head, rest)) = self.data.get_mut(end..next).and_then(<[u8]>::split_first_mut) else {
             // A list that breaks its own bound is cut off: it and the cells after it, however small, show nothing.
             if let Some(rest) = self.data.get_mut(end..) {
                 rest.fill(0);
             }
-            return self.data.len();
+            return (Cursor::NOWHERE, self.data.len());
         };
-        *count = labels.len() as u8;
+        *head = labels.len() as u8;
         for (slot, byte) in rest.iter_mut().zip(labels.iter().copied().chain(sheets.tests.to_le_bytes())) {
             *slot = byte;
         }
-        next
+        (Cursor { at: end, along: 0 }, next)
     }
 }
 
+/// Bits of a list's first byte that count its labels, at most [`MAX_SHEETS`]; those above count further cells with the same one.
+const COUNT_BITS: u32 = 4;
+/// The most further cells.
+const MOST_MORE: u8 = 15;
+
+const fn labels_of(head: u8) -> usize {
+    (head & ((1 << COUNT_BITS) - 1)) as usize
+}
+
+const fn more_of(head: u8) -> u8 {
+    head >> COUNT_BITS
+}
+
+/// Cells from `cursor` on, where a list begins with `head`, that it is the list of.
+fn left_of(head: u8, cursor: Cursor) -> usize {
+    usize::from(more_of(head).saturating_sub(cursor.along)).wrapping_add(1)
+}
+
 /// Bytes that a list of `count` labels takes.
-#[must_use]
-pub const fn bytes(count: usize) -> usize {
+const fn bytes(count: usize) -> usize {
     count.saturating_add(if count > 1 { 3 } else { 1 })
+}
+
+/// Bytes that the `lists` of a row of cells take, labels each.
+pub fn row_bytes<'l>(lists: impl Iterator<Item = &'l [u8]>) -> usize {
+    let (mut sum, mut before, mut more) = (0usize, None, 0u8);
+    for list in lists {
+        more = if before == Some(list) && list.len() == 1 && more < MOST_MORE { more.wrapping_add(1) } else { 0 };
+        if more == 0 {
+            sum = sum.saturating_add(bytes(list.len()));
+        }
+        before = Some(list);
+    }
+    sum
 }
 
 /// A place among the lists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cursor {
     at: usize,
+    /// Cells to the left that share the list.
+    along: u8,
 }
 
 impl Cursor {
-    const NOWHERE: Self = Self { at: usize::MAX };
+    const NOWHERE: Self = Self { at: usize::MAX, along: 0 };
 
-    /// The cell to the right of one whose sheets are `sheets`.
-    #[must_use]
-    pub fn past(self, sheets: SheetsRef<'_>) -> Self {
-        Self { at: self.at.saturating_add(bytes(sheets.labels.len())) }
+    /// So many `cells` to the right, of those that share a list that begins with `head`, and past them at most.
+    #[inline(always)]
+    fn on(self, head: u8, cells: usize) -> Self {
+        if cells < left_of(head, self) {
+            Self { along: self.along.wrapping_add(cells as u8), ..self }
+        } else {
+            Self { at: self.at.saturating_add(bytes(labels_of(head))), along: 0 }
+        }
     }
 
     /// The cell to the right.
     #[must_use]
     pub fn next(self, lists: &Lists<'_>) -> Self {
-        self.past(lists.sheets(self))
+        lists.data.get(self.at).map_or(Self::NOWHERE, |&head| self.on(head, 1))
     }
 }
 
@@ -167,35 +251,39 @@ pub fn code_row<B: Bits>(
         *start = end as u16;
     }
     let mut here = before.map_or(Cursor::NOWHERE, |lists| lists.row(row));
-    let mut below = before.map_or(Cursor::NOWHERE, |lists| lists.row(row.wrapping_add(1)));
     let (mut west, mut north_west) = (Cursor::NOWHERE, Cursor::NOWHERE);
     let mut north = row.checked_sub(1).map_or(Cursor::NOWHERE, |above| target.row_of(above));
-    let mut cell = row.wrapping_mul(grid.columns);
     for column in 0..grid.columns {
         let last = column.wrapping_add(1) == grid.columns;
         let north_east = if last { Cursor::NOWHERE } else { north.next(target) };
-        let sheets = {
-            let around = Around {
-                near: [
-                    before.map_or_else(SheetsRef::default, |l| l.sheets(here)),
-                    target.sheets(west),
-                    target.sheets(north),
-                    target.sheets(north_east),
-                    target.sheets(north_west),
-                ],
-                far: [
-                    before.map_or_else(SheetsRef::default, |l| l.sheets(if last { Cursor::NOWHERE } else { here.next(l) })),
-                    before.map_or_else(SheetsRef::default, |l| l.sheets(below)),
-                ],
-            };
-            coder.list(&around, &wanted(cell))
-        };
-        (west, north_west, north) = (Cursor { at: end }, north, north_east);
-        end = target.push(end, &sheets);
+        let wanted = wanted(row.wrapping_mul(grid.columns).wrapping_add(column));
+        // In most cells all neighbours have one and the same label.
+        let alike = before
+            .and_then(|lists| lists.single(here))
+            .filter(|label| [west, north, north_east, north_west].iter().all(|&cursor| target.single(cursor) == Some(*label)));
+        let again = alike.filter(|&label| coder.again(label, &wanted));
+        let sheets = again.map_or_else(
+            || {
+                let near = [west, north, north_east, north_west].map(|cursor| target.sheets(cursor));
+                let time = before.map_or_else(SheetsRef::default, |lists| lists.sheets(here));
+                let [west, north, north_east, north_west] = near;
+                let near = [time, west, north, north_east, north_west];
+                let known = if alike.is_some() { None } else { coder.neighbour(&near, &wanted) };
+                known.unwrap_or_else(|| {
+                    let far = before.map_or_else(Default::default, |lists| {
+                        let east = if last { Cursor::NOWHERE } else { here.next(lists) };
+                        [lists.sheets(east), lists.sheets(lists.cell(row.wrapping_add(1), column))]
+                    });
+                    coder.spell(near.iter().chain(&far), &wanted)
+                })
+            },
+            Sheets::single,
+        );
+        (north_west, north) = (north, north_east);
+        (west, end) = target.push(west, end, &sheets);
         if let Some(lists) = before {
-            (here, below) = (here.next(lists), below.next(lists));
+            here = here.next(lists);
         }
-        cell = cell.wrapping_add(1);
     }
     if let Some(start) = target.rows.get_mut(row.wrapping_add(1)) {
         *start = end as u16;
@@ -205,16 +293,8 @@ pub fn code_row<B: Bits>(
 impl Lists<'_> {
     /// Like [`Lists::row`], for a row that is being written.
     fn row_of(&self, row: usize) -> Cursor {
-        Cursor { at: self.rows.get(row).map_or(usize::MAX, |&at| usize::from(at)) }
+        Cursor { at: self.rows.get(row).map_or(usize::MAX, |&at| usize::from(at)), along: 0 }
     }
-}
-
-/// The lists a cell's own is told from.
-struct Around<'l> {
-    /// Tried whole: the same cell before, west, north, north-east, north-west.
-    near: [SheetsRef<'l>; 5],
-    /// Their labels are likely too: east and south before.
-    far: [SheetsRef<'l>; 2],
 }
 
 struct Coder<'c, B> {
@@ -228,32 +308,39 @@ impl<B: Bits> Coder<'_, B> {
         self.contexts.get_mut(context).is_some_and(|context| self.bits.bit(context, value))
     }
 
-    /// One cell's list: the first of the neighbours' lists that is the same, else spelt out.
-    fn list(&mut self, around: &Around<'_>, wanted: &Sheets) -> Sheets {
-        let [time, west, north, ..] = around.near;
+    /// Whether a cell whose neighbours all list `label` and no other lists it too.
+    #[inline(always)]
+    fn again(&mut self, label: u8, wanted: &Sheets) -> bool {
+        // All of them agree, and none is torn.
+        self.flag(SAME_ALL, *wanted.labels == [label])
+    }
+
+    /// The first of the neighbours' lists that is the cell's own: the same cell's before, west, north, north-east, north-west. `None`: none is.
+    fn neighbour(&mut self, near: &[SheetsRef<'_>; 5], wanted: &Sheets) -> Option<Sheets> {
+        let [time, west, north, ..] = near;
         let agree = usize::from(time == west) | usize::from(west == north) << 1 | usize::from(time == north) << 2;
-        let torn = usize::from(around.near.iter().any(|list| list.labels.len() > 1));
+        let torn = usize::from(near.iter().any(|list| list.labels.len() > 1));
         let same = SheetsRef { labels: &wanted.labels, tests: wanted.tests };
         let mut place = 0usize;
-        for (index, list) in around.near.iter().enumerate() {
-            let seen = around.near.iter().take(index).any(|earlier| earlier == list);
+        for (index, list) in near.iter().enumerate() {
+            let seen = near.iter().take(index).any(|earlier| earlier == list);
             if list.labels.is_empty() || seen {
                 continue;
             }
             let context = agree.wrapping_mul(2).wrapping_add(torn).wrapping_mul(5).wrapping_add(place);
             if self.flag(context, *list == same) {
-                return Sheets { labels: Vec::from_slice(list.labels).unwrap_or_default(), tests: list.tests };
+                return Some(Sheets { labels: Vec::from_slice(list.labels).unwrap_or_default(), tests: list.tests });
             }
             place = place.wrapping_add(1);
         }
-        self.spell(around, wanted)
+        None
     }
 
-    /// A list that no neighbour has: its length, then each label, by its place among the neighbours' labels where it has
-    /// one, and each test.
-    fn spell(&mut self, around: &Around<'_>, wanted: &Sheets) -> Sheets {
+    /// A list that no neighbour has: its length, then each label, by its place among the labels of the lists `around` where it has one, and each test.
+    #[inline(never)]
+    fn spell<'l>(&mut self, around: impl Iterator<Item = &'l SheetsRef<'l>>, wanted: &Sheets) -> Sheets {
         let mut pool: Vec<u8, POOL> = Vec::new();
-        for label in around.near.iter().chain(&around.far).flat_map(|list| list.labels.iter()) {
+        for label in around.flat_map(|list| list.labels.iter()) {
             if !pool.contains(label) && pool.push(*label).is_err() {
                 break;
             }

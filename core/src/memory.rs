@@ -10,10 +10,12 @@ use crate::key::{Chain, Key};
 use crate::lists::{self, Lists};
 use crate::nodes::{self, Layout};
 use crate::pack::{self, Picture, Recent, Scratch};
-use crate::plan::{Mixed, Plan, Run, TILE_LOG2, Tile};
+use crate::plan::{Plan, Run};
 use crate::record::Stream;
 use crate::row::{NodeRow, Point};
 use crate::sheet::{RowSheets, Sheet, Stretch};
+use crate::torn::{Mixed, SIDES_LOG2, Side};
+use crate::window::{TILE_LOG2, Tile};
 use bytemuck::Pod;
 
 /// The caller's memory, cut up.
@@ -154,6 +156,9 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, space: &mut Workspace<'
     (space.sheets.stretch, space.sheets.sheet) = (cutter.take::<Stretch>(grid.columns), cutter.take::<Sheet>(limits.row_sheets.into()));
     let plan = &mut space.plan;
     (plan.tile, plan.run, plan.mixed) = (cutter.take::<Tile>(tiles), cutter.take::<Run>(tiles), cutter.take::<Mixed>(blocks));
+    // A sheet shows in every block of its cell at most.
+    let sides = if block_log2 <= SIDES_LOG2 { usize::from(limits.row_sheets).wrapping_shl(cubic.into()) } else { 0 };
+    plan.side = cutter.take::<Side>(sides);
 }
 
 impl Bundle<'_> {

@@ -233,7 +233,7 @@ impl<'l, 'm> Corner<'l, 'm> {
             let mut sheets = SheetsRef::default();
             if let Some((list, cursor)) = right.as_mut().filter(|_| inside) {
                 sheets = list.sheets(*cursor);
-                *cursor = cursor.past(sheets);
+                *cursor = cursor.next(list);
             }
             collect(*left, found);
             collect(sheets, found);

@@ -92,9 +92,10 @@ impl RowSheets<'_> {
             let listed = lists.sheets(cursor);
             let first = count;
             let mut cells = 1usize;
-            cursor = cursor.past(listed);
+            cursor = cursor.next(lists);
             for (index, &label) in listed.labels.iter().enumerate() {
-                let found = look_up(rows, cubic, label, listed.test(index) as u8, column);
+                let test = listed.test(index) as u8;
+                let found = look_up(rows, cubic, label, test, column);
                 let Some(((sheet, most), slot)) = found.zip(self.sheet.get_mut(count)) else { continue };
                 *slot = sheet;
                 count = count.wrapping_add(1);

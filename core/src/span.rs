@@ -2,10 +2,10 @@
 //! block by block where several sheets take turns. What is where comes from `plan`; pixels go to the caller's row.
 
 use crate::atlas::Texture;
-use crate::coverage::{Chart, Cover};
+use crate::coverage::{Bounds, Chart, Cover, Edge};
 use crate::fixed::PlayUv;
-use crate::plan::{TILE_LOG2, Tile};
 use crate::sheet::Corners;
+use crate::window::{TILE_LOG2, Tile};
 
 /// A position in a window: v in its lower WIDTH + ROWS bits, WIDTH of them its fraction, u above, its upper WIDTH bits the texel.
 #[derive(Clone, Copy, Debug)]
@@ -35,24 +35,26 @@ impl<const WIDTH: u32, const ROWS: u32> Packed<WIDTH, ROWS> {
     }
 }
 
-/// Paints `out`, a run's `tiles` of `PIXELS` pixels each, and steps them down a row. `make` turns a position into a pixel, once it is moved by
-/// one of `offsets` where the pixel is an even or an odd one of its row.
+/// Paints `out`, row `row` of a run's `tiles` of `PIXELS` pixels each. `make` turns a position into a pixel, once it is moved by one of `offsets`
+/// where the pixel is an even or an odd one of its row.
 #[inline(always)]
 pub fn run<T, const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(
-    tiles: &mut [Tile],
+    tiles: &[Tile],
+    row: u32,
     out: &mut [T],
     offsets: [u32; 2],
     make: impl Fn(Packed<WIDTH, ROWS>) -> T,
 ) {
-    for (tile, pixels) in tiles.iter_mut().zip(out.as_chunks_mut::<PIXELS>().0) {
-        alternate(pixels, tile.advance(), offsets, &make);
+    for (tile, pixels) in tiles.iter().zip(out.as_chunks_mut::<PIXELS>().0) {
+        alternate(pixels, tile.row(row), offsets, &make);
     }
 }
 
 /// Like [`run`], with tiles of any 2^`log2` pixels.
 #[inline(always)]
 pub fn any_run<T, const WIDTH: u32, const ROWS: u32>(
-    tiles: &mut [Tile],
+    tiles: &[Tile],
+    row: u32,
     out: &mut [T],
     log2: u32,
     offsets: [u32; 2],
@@ -62,7 +64,7 @@ pub fn any_run<T, const WIDTH: u32, const ROWS: u32>(
     for tile in tiles {
         let Some((pixels, rest)) = out.split_at_mut_checked(1 << log2.min(TILE_LOG2)) else { return };
         out = rest;
-        alternate(pixels, tile.advance(), offsets, &make);
+        alternate(pixels, tile.row(row), offsets, &make);
     }
 }
 
@@ -80,6 +82,25 @@ fn alternate<T, const WIDTH: u32, const ROWS: u32>(
     for (x, pixel) in pixels.iter_mut().enumerate() {
         *pixel = make(Packed(at));
         at = at.wrapping_add(if x & 1 == 0 { there } else { back });
+    }
+}
+
+/// Paints those of `pixels`, row `row` of `tile`, that `shown` names, a bit each, like [`run`].
+#[inline(always)]
+pub fn part<T, const WIDTH: u32, const ROWS: u32>(
+    tile: &Tile,
+    row: u32,
+    mut shown: u32,
+    pixels: &mut [T],
+    [even, odd]: [u32; 2],
+    make: impl Fn(Packed<WIDTH, ROWS>) -> T,
+) {
+    let [mut at, step] = tile.row(row);
+    for (x, pixel) in pixels.iter_mut().enumerate() {
+        if shown & 1 != 0 {
+            *pixel = make(Packed(at.wrapping_add(if x & 1 == 0 { even } else { odd })));
+        }
+        (shown, at) = (shown >> 1, at.wrapping_add(step));
     }
 }
 
@@ -106,18 +127,22 @@ const fn down(from: i32, to: i32, step: u32, log2: u32) -> i32 {
     from.wrapping_add((far >> log2).wrapping_mul(rows)).wrapping_add(rest.wrapping_mul(rows) >> log2)
 }
 
+/// One of a position's coordinates along row `row` of a block of 2^`log2` pixels, given those at its corners: at the first pixel, and from pixel to pixel.
+#[inline(always)]
+const fn along([a, b, c, d]: [i32; 4], row: u32, log2: u32) -> (i32, i32) {
+    let (from, to) = (down(a, c, row, log2), down(b, d, row, log2));
+    (from, to.wrapping_sub(from).wrapping_add((1i32 << log2) >> 1) >> log2)
+}
+
 impl Span {
     /// The span of row `row` of a block of 2^`log2` pixels, whose corners are given; steps rounded to nearest, so that the last pixel is at
     /// most 2^(log2 - 1) / 65536 texel off.
     #[must_use]
     #[inline]
     pub const fn new([a, b, c, d]: Corners, row: u32, log2: u32) -> Self {
-        let from = PlayUv { u: down(a.u, c.u, row, log2), v: down(a.v, c.v, row, log2) };
-        let to = PlayUv { u: down(b.u, d.u, row, log2), v: down(b.v, d.v, row, log2) };
-        let half = (1i32 << log2) >> 1;
-        let step =
-            PlayUv { u: to.u.wrapping_sub(from.u).wrapping_add(half) >> log2, v: to.v.wrapping_sub(from.v).wrapping_add(half) >> log2 };
-        Self { from, step }
+        let (u, step_u) = along([a.u, b.u, c.u, d.u], row, log2);
+        let (v, step_v) = along([a.v, b.v, c.v, d.v], row, log2);
+        Self { from: PlayUv { u, v }, step: PlayUv { u: step_u, v: step_v } }
     }
 
     /// Like [`Span::new`], `across` and `down` quarters of a pixel beside the pixels' centres.
@@ -132,7 +157,8 @@ impl Span {
     }
 
     /// The position `pixels` pixels on.
-    const fn at(&self, pixels: usize) -> PlayUv {
+    #[must_use]
+    pub const fn at(&self, pixels: usize) -> PlayUv {
         let count = pixels as i32;
         PlayUv {
             u: self.from.u.wrapping_add(self.step.u.wrapping_mul(count)),
@@ -195,22 +221,60 @@ impl Field {
     #[must_use]
     #[inline(always)]
     pub fn positive(&self, pixels: usize) -> u32 {
-        let mut field = self.from;
-        let mut shown = 0u32;
-        for pixel in 0..pixels as u32 {
-            // The sign of what is below zero where the field is above.
-            shown |= (field.wrapping_neg() as u32 >> 31).wrapping_shl(pixel);
-            field = field.wrapping_add(self.step);
-        }
-        shown
+        // What is below zero where the field is above.
+        negative(self.from.wrapping_neg(), self.step.wrapping_neg(), pixels)
     }
+}
+
+/// Which of the next `pixels` pixels, a multiple of four, have a value below zero, from `value` on, `step` more each: a bit each.
+#[inline(always)]
+fn negative(mut value: i32, step: i32, pixels: usize) -> u32 {
+    let mut below = 0u32;
+    for first in (0..pixels as u32).step_by(4) {
+        let mut four = 0u32;
+        for pixel in 0..4 {
+            four |= (value as u32 >> 31).wrapping_shl(pixel);
+            value = value.wrapping_add(step);
+        }
+        below |= four.wrapping_shl(first);
+    }
+    below
+}
+
+impl Edge {
+    /// Which pixels of row `row` of a block of 2^`log2`, four at least, lie on its inner side: a bit each, at positions as [`Span::new`] has them.
+    #[inline(always)]
+    #[must_use]
+    pub fn row(&self, row: u32, log2: u32) -> u32 {
+        let (from, step) = along(self.corners, row, log2);
+        let inside = if self.upper {
+            negative(from.wrapping_sub(self.at), step, 1 << log2)
+        } else {
+            !negative(from.wrapping_sub(self.at), step, 1 << log2)
+        };
+        inside & 1u32.wrapping_shl(1 << log2).wrapping_sub(1)
+    }
+}
+
+/// Those of the pixels that `shown` names, of a span of `pixels`, whose texels the mask has.
+#[inline(always)]
+#[must_use]
+pub fn covered(mut shown: u32, pixels: usize, span: Span, texture: &Texture<'_>) -> u32 {
+    let mut uv = span.from;
+    for pixel in 0..pixels as u32 {
+        if shown.wrapping_shr(pixel) & 1 != 0 && !texture.covered(uv) {
+            shown &= !1u32.wrapping_shl(pixel);
+        }
+        uv = uv.plus(span.step);
+    }
+    shown
 }
 
 /// Those of the pixels that `shown` names, of a span of `pixels`, at which the span lies inside `chart`.
 #[inline(always)]
 #[must_use]
 pub fn inside(chart: &Chart, mut shown: u32, pixels: usize, span: Span, texture: &Texture<'_>) -> u32 {
-    match chart.cover(&[span.from, span.at(pixels.wrapping_sub(1))]) {
+    match chart.cover(&Bounds::of(span.from, span.at(pixels.wrapping_sub(1)))) {
         Cover::Nothing => return 0,
         Cover::All => return shown,
         Cover::Part => {}
@@ -223,4 +287,41 @@ pub fn inside(chart: &Chart, mut shown: u32, pixels: usize, span: Span, texture:
         uv = uv.plus(span.step);
     }
     shown
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Span, inside};
+    use crate::atlas::Texture;
+    use crate::coverage::{Bounds, Chart};
+    use crate::fixed::PlayUv;
+    use crate::format::LabelRecord;
+
+    #[test]
+    fn edges_that_a_block_may_cross_tell_what_a_test_of_each_position_does() {
+        let mut seed = 9u32;
+        let mut next = |below: u32| {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            ((u64::from(seed) * u64::from(below)) >> 32) as i32
+        };
+        let texture = Texture { texels: &[], mask: &[], width_log2: 9, height: 512 };
+        let chart = Chart::new(&LabelRecord { left: 20, top: 30, right: 24, bottom: 33, ..LabelRecord::default() });
+        let (mut some, mut none) = (0, 0);
+        for round in 0..20_000u32 {
+            let reach = if round % 2 == 0 { 1 << 17 } else { 1 << 20 };
+            let corners = [(); 4].map(|()| PlayUv { u: (20 << 16) + next(reach) - next(reach), v: (31 << 16) + next(reach) - next(reach) });
+            let edges = chart.edges(&corners, &Bounds::around(&corners));
+            for log2 in [2, 3] {
+                let pixels = 1usize << log2;
+                for row in 0..pixels as u32 {
+                    let all = u32::MAX >> (32 - pixels);
+                    let told = edges.iter().flatten().fold(all, |shown, edge| shown & edge.row(row, log2));
+                    let exact = inside(&chart, all, pixels, Span::new(corners, row, log2), &texture);
+                    assert_eq!(told, exact, "{corners:?}, row {row}");
+                    (some, none) = (some + u32::from(exact != 0), none + u32::from(exact == 0));
+                }
+            }
+        }
+        assert!(some > 10_000 && none > 10_000, "{some} {none}");
+    }
 }

@@ -19,9 +19,11 @@ use crate::filter::{Bilinear, Dither, Filter, Nearest, mean};
 use crate::fixed::PlayUv;
 use crate::format::TexelKind;
 use crate::pack::{self, Picture, Scratch};
-use crate::plan::{Run, Tile};
+use crate::plan::Run;
 use crate::playing::{Look, Playing};
 use crate::span::{self, Packed};
+use crate::torn::Side;
+use crate::window::Tile;
 
 /// A kind of texels, or several, that a [`crate::Player`] plays: [`Indexed8`], [`Indexed4`], [`Direct565`] or [`AnyTexels`].
 pub trait Texels: Source {}
@@ -161,7 +163,8 @@ trait Colours {
         &self,
         filter: F,
         run: Run,
-        tiles: &mut [Tile],
+        tiles: &[Tile],
+        row: u32,
         out: &mut [u16],
         log2: u32,
     );
@@ -175,7 +178,6 @@ struct Lookup<C, F> {
 
 impl<C: Colours, F: Filter> Paint for Lookup<C, F> {
     type Pixel = u16;
-    const OFTEN: bool = true;
     const REACH: i32 = F::REACH;
 
     #[inline(always)]
@@ -184,8 +186,16 @@ impl<C: Colours, F: Filter> Paint for Lookup<C, F> {
     }
 
     #[inline(always)]
-    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, tiles: &mut [Tile], out: &mut [u16], log2: u32) {
-        self.colours.run::<F, WIDTH, ROWS, TEXELS>(self.filter, run, tiles, out, log2);
+    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, tiles: &[Tile], row: u32, out: &mut [u16], log2: u32) {
+        self.colours.run::<F, WIDTH, ROWS, TEXELS>(self.filter, run, tiles, row, out, log2);
+    }
+
+    #[inline(always)]
+    fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, row: u32, out: &mut [u16]) {
+        let from = usize::from(side.row).wrapping_shl(WIDTH);
+        span::part(&side.tile, row, side.shown.row(row), out, self.filter.offsets(WIDTH), |at: Packed<WIDTH, ROWS>| {
+            self.filter.packed(at, |index| self.colours.colour(from.wrapping_add(index)))
+        });
     }
 }
 
@@ -219,14 +229,15 @@ impl Colours for Colours8<'_> {
         &self,
         filter: F,
         run: Run,
-        tiles: &mut [Tile],
+        tiles: &[Tile],
+        row: u32,
         out: &mut [u16],
         log2: u32,
     ) {
         let from = usize::from(run.row).wrapping_shl(WIDTH);
         // The plan keeps windows inside the picture.
         let Some(window) = self.texture.texels.get(from..).and_then(<[u8]>::first_chunk::<TEXELS>) else { return };
-        paint_run::<_, WIDTH, ROWS>(filter, tiles, out, log2, |index| {
+        paint_run::<_, WIDTH, ROWS>(filter, tiles, row, out, log2, |index| {
             self.entry(window.get(index & TEXELS.wrapping_sub(1)).copied().unwrap_or(0))
         });
     }
@@ -236,7 +247,8 @@ impl Colours for Colours8<'_> {
 #[inline(always)]
 fn paint_run<F: Filter, const WIDTH: u32, const ROWS: u32>(
     filter: F,
-    tiles: &mut [Tile],
+    tiles: &[Tile],
+    row: u32,
     out: &mut [u16],
     log2: u32,
     colour: impl Fn(usize) -> u16,
@@ -245,9 +257,9 @@ fn paint_run<F: Filter, const WIDTH: u32, const ROWS: u32>(
     let make = |at: Packed<WIDTH, ROWS>| filter.packed(at, &colour);
     // Tiles of four or eight in a picture 512 wide are the rule, and have loops of their own.
     match (WIDTH, log2) {
-        (9, 2) => span::run::<_, WIDTH, ROWS, 4>(tiles, out, offsets, make),
-        (9, 3) => span::run::<_, WIDTH, ROWS, 8>(tiles, out, offsets, make),
-        _ => span::any_run(tiles, out, log2, offsets, make),
+        (9, 2) => span::run::<_, WIDTH, ROWS, 4>(tiles, row, out, offsets, make),
+        (9, 3) => span::run::<_, WIDTH, ROWS, 8>(tiles, row, out, offsets, make),
+        _ => span::any_run(tiles, row, out, log2, offsets, make),
     }
 }
 
@@ -290,13 +302,16 @@ impl Colours4<'_> {
         &self,
         filter: F,
         run: Run,
-        tiles: &mut [Tile],
+        tiles: &[Tile],
+        row: u32,
         out: &mut [u16],
         log2: u32,
     ) {
         let from = usize::from(run.row).wrapping_shl(WIDTH) >> 1;
         let Some(window) = self.texture.texels.get(from..).and_then(<[u8]>::first_chunk::<BYTES>) else { return };
-        paint_run::<_, WIDTH, ROWS>(filter, tiles, out, log2, |index| self.entry(window, index & BYTES.wrapping_mul(2).wrapping_sub(1)));
+        paint_run::<_, WIDTH, ROWS>(filter, tiles, row, out, log2, |index| {
+            self.entry(window, index & BYTES.wrapping_mul(2).wrapping_sub(1))
+        });
     }
 }
 
@@ -315,14 +330,15 @@ impl Colours for Colours4<'_> {
         &self,
         filter: F,
         run: Run,
-        tiles: &mut [Tile],
+        tiles: &[Tile],
+        row: u32,
         out: &mut [u16],
         log2: u32,
     ) {
         // Half of TEXELS, which is one of two numbers.
         match TEXELS {
-            0x2000 => self.window::<_, WIDTH, ROWS, 0x1000>(filter, run, tiles, out, log2),
-            _ => self.window::<_, WIDTH, ROWS, 0x2000>(filter, run, tiles, out, log2),
+            0x2000 => self.window::<_, WIDTH, ROWS, 0x1000>(filter, run, tiles, row, out, log2),
+            _ => self.window::<_, WIDTH, ROWS, 0x2000>(filter, run, tiles, row, out, log2),
         }
     }
 }
@@ -374,7 +390,8 @@ impl Colours for ColoursDirect<'_> {
         &self,
         filter: F,
         run: Run,
-        tiles: &mut [Tile],
+        tiles: &[Tile],
+        row: u32,
         out: &mut [u16],
         log2: u32,
     ) {
@@ -383,9 +400,9 @@ impl Colours for ColoursDirect<'_> {
         let Some(window) = texels.get(from..).and_then(<[[u8; 2]]>::first_chunk::<TEXELS>) else { return };
         // A loop for either order of bytes.
         if self.swapped {
-            paint_run::<_, WIDTH, ROWS>(filter, tiles, out, log2, |index| pixel::<true>(window.get(index & TEXELS.wrapping_sub(1))));
+            paint_run::<_, WIDTH, ROWS>(filter, tiles, row, out, log2, |index| pixel::<true>(window.get(index & TEXELS.wrapping_sub(1))));
         } else {
-            paint_run::<_, WIDTH, ROWS>(filter, tiles, out, log2, |index| pixel::<false>(window.get(index & TEXELS.wrapping_sub(1))));
+            paint_run::<_, WIDTH, ROWS>(filter, tiles, row, out, log2, |index| pixel::<false>(window.get(index & TEXELS.wrapping_sub(1))));
         }
     }
 }
@@ -440,14 +457,15 @@ impl Colours for AnyColours<'_> {
         &self,
         filter: F,
         run: Run,
-        tiles: &mut [Tile],
+        tiles: &[Tile],
+        row: u32,
         out: &mut [u16],
         log2: u32,
     ) {
         match self {
-            Self::Eight(colours) => colours.run::<F, WIDTH, ROWS, TEXELS>(filter, run, tiles, out, log2),
-            Self::Four(colours) => colours.run::<F, WIDTH, ROWS, TEXELS>(filter, run, tiles, out, log2),
-            Self::Direct(colours) => colours.run::<F, WIDTH, ROWS, TEXELS>(filter, run, tiles, out, log2),
+            Self::Eight(colours) => colours.run::<F, WIDTH, ROWS, TEXELS>(filter, run, tiles, row, out, log2),
+            Self::Four(colours) => colours.run::<F, WIDTH, ROWS, TEXELS>(filter, run, tiles, row, out, log2),
+            Self::Direct(colours) => colours.run::<F, WIDTH, ROWS, TEXELS>(filter, run, tiles, row, out, log2),
         }
     }
 }

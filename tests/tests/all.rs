@@ -13,6 +13,7 @@ mod hard_numbers;
 mod hard_stability;
 mod hostile;
 mod hostile_many;
+mod lists;
 mod packed;
 mod texels;
 mod unusual;

@@ -46,7 +46,8 @@ pub(super) fn of(content: &Content<'_>, labels: &[LabelRecord], settings: Coding
     // The most layers in a run of `length` nodes.
     let most_layers = |length: usize| layers.start.iter().step_by(length).zip(layers.start.iter().skip(length).step_by(length));
     let most_layers = |length: usize| most_layers(length).map(|(from, to)| (to - from) as usize).max().unwrap_or(0);
-    let list_bytes = |lists: &[Vec<u8>]| lists.iter().map(|list| lists::bytes(list.len())).sum();
+    let row_bytes = |lists: &[Vec<u8>]| lists::row_bytes(lists.iter().map(Vec::as_slice));
+    let list_bytes = |lists: &[Vec<u8>]| lists.chunks(grid.grid.columns).map(row_bytes).sum();
     let row_sheets = |lists: &[Vec<u8>]| lists.iter().map(Vec::len).sum();
     let (back, ahead) = reach(grid.time);
     let key_layers = bound("layers in a key", most_layers(nodes), COARSER)?;

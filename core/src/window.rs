@@ -1,0 +1,137 @@
+//! Windows: so many rows of the source image that a position in them is one 32-bit number. What is drawn is stepped in tiles of such positions,
+//! which come from a block's corners; `plan` and `torn` make them, `span` draws them.
+
+use crate::coverage::Bounds;
+use crate::sheet::Corners;
+
+/// A tile, in caller's memory: 2^[`TILE_LOG2`] pixels of a row, or a block's where that is smaller, and as many rows. All are positions in a
+/// window, or differences of such, as [`crate::span::Packed`] holds them.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Tile {
+    /// Where its first pixel is in its first row.
+    pub at: u32,
+    /// How far it is from pixel to pixel there.
+    pub step: u32,
+    /// How far it is from row to row,
+    pub down: u32,
+    /// and how the step changes.
+    pub turn: u32,
+}
+
+impl Tile {
+    /// Where it is in row `row` of its own, and how far it is from pixel to pixel there.
+    #[inline(always)]
+    pub const fn row(&self, row: u32) -> [u32; 2] {
+        [self.at.wrapping_add(self.down.wrapping_mul(row)), self.step.wrapping_add(self.turn.wrapping_mul(row))]
+    }
+}
+
+/// Tiles are at most 2^this pixels wide and high: over more of them rounding would add up to something.
+pub const TILE_LOG2: u32 = 3;
+
+/// How positions are held in a window, where the picture's width allows for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Window {
+    /// The picture's width is 2^this.
+    pub width_log2: u32,
+    /// The window has 2^this rows.
+    pub rows_log2: u32,
+}
+
+impl Window {
+    /// That of pictures 512 texels wide, as most are: what is made for it has code of its own.
+    pub const USUAL: Self = Self { width_log2: 9, rows_log2: 5 };
+
+    /// The window for pictures 2^`width_log2` texels wide and `height` high: the fraction bits are shared out so that a texel
+    /// has at least 256 steps.
+    #[must_use]
+    pub const fn new(width_log2: u32, height: u32) -> Option<Self> {
+        let rows_log2 = if width_log2 == 10 { 4 } else { 5 };
+        let known = matches!(width_log2, 8..=10);
+        if known && height >= 1 << rows_log2 { Some(Self { width_log2, rows_log2 }) } else { None }
+    }
+
+    /// Whether what lies within `bounds` is inside the window from `row` on, and the picture, for pixels that are told from as far as `reach` around it.
+    #[must_use]
+    #[inline(always)]
+    pub const fn holds(self, &Bounds { low, high }: &Bounds, row: u16, reach: i32) -> bool {
+        let margin = MARGIN.wrapping_add(reach);
+        let first = (row as i32).wrapping_shl(16);
+        let (right, end) = (1i32.wrapping_shl(self.width_log2.wrapping_add(16)), 1i32.wrapping_shl(self.rows_log2.wrapping_add(16)));
+        low.u >= margin
+            && high.u < right.wrapping_sub(margin)
+            && low.v >= first.wrapping_add(margin)
+            && high.v < first.wrapping_add(end).wrapping_sub(margin)
+    }
+
+    /// The first row of a window, in a picture `height` high, that holds what lies within `bounds` and begins there; `None` where there is no such.
+    #[must_use]
+    #[inline(always)]
+    pub fn row(self, bounds: &Bounds, height: u32, reach: i32) -> Option<u16> {
+        self.held(bounds, bounds.low.v.wrapping_sub(MARGIN.wrapping_add(reach)) >> 16, height, reach)
+    }
+
+    /// Likewise of one that ends where they do.
+    #[must_use]
+    #[inline(always)]
+    pub fn row_to(self, bounds: &Bounds, height: u32, reach: i32) -> Option<u16> {
+        let end = (bounds.high.v.wrapping_add(MARGIN.wrapping_add(reach)) >> 16).wrapping_add(1);
+        self.held(bounds, end.wrapping_sub(1i32.wrapping_shl(self.rows_log2)), height, reach)
+    }
+
+    /// The row of the picture that comes closest to `row`, if the window from there on holds what lies within `bounds`.
+    #[inline(always)]
+    fn held(self, bounds: &Bounds, row: i32, height: u32, reach: i32) -> Option<u16> {
+        let row = row.min(height.wrapping_sub(1u32.wrapping_shl(self.rows_log2)) as i32).max(0) as u16;
+        Some(row).filter(|&row| self.holds(bounds, row, reach))
+    }
+
+    /// A difference of u and v in Q16 texels, or a position with v from the window's first row on, as [`crate::span::Packed`] holds it,
+    /// divided by 2^`log2`, each to the nearest.
+    #[inline(always)]
+    pub const fn pack(self, u: i32, v: i32, log2: u32) -> u32 {
+        let bits = self.width_log2.wrapping_add(self.rows_log2);
+        // u has what v and whole texels leave of 32 bits for its fraction, v as many as the picture's width.
+        let across = 16u32.wrapping_add(bits).wrapping_add(self.width_log2).wrapping_sub(32).wrapping_add(log2);
+        let down = 16u32.wrapping_sub(self.width_log2).wrapping_add(log2);
+        (rounded(u, across) as u32).wrapping_shl(bits).wrapping_add(rounded(v, down) as u32)
+    }
+
+    /// The tile of 2^`log2` by 2^`log2` pixels between corners `a` and `b` above, `c` and `d` below, in a window from `row` on.
+    #[must_use]
+    #[inline(always)]
+    pub fn tile(self, corners: Corners, row: u16, log2: u32) -> Tile {
+        match (self, log2) {
+            (Self::USUAL, 2) => Self::USUAL.packed(corners, row, 2),
+            (Self::USUAL, 3) => Self::USUAL.packed(corners, row, 3),
+            _ => self.any_tile(corners, row, log2),
+        }
+    }
+
+    #[inline(never)]
+    fn any_tile(self, corners: Corners, row: u16, log2: u32) -> Tile {
+        self.packed(corners, row, log2)
+    }
+
+    #[inline(always)]
+    fn packed(self, [a, b, c, d]: Corners, row: u16, log2: u32) -> Tile {
+        let (above_u, above_v) = (b.u.wrapping_sub(a.u), b.v.wrapping_sub(a.v));
+        let (below_u, below_v) = (d.u.wrapping_sub(c.u), d.v.wrapping_sub(c.v));
+        Tile {
+            at: self.pack(a.u, a.v.wrapping_sub(i32::from(row).wrapping_shl(16)), 0),
+            step: self.pack(above_u, above_v, log2),
+            down: self.pack(c.u.wrapping_sub(a.u), c.v.wrapping_sub(a.v), log2),
+            turn: self.pack(below_u.wrapping_sub(above_u), below_v.wrapping_sub(above_v), log2.wrapping_mul(2)),
+        }
+    }
+}
+
+/// `x` / 2^`log2`, to the nearest.
+#[inline(always)]
+const fn rounded(x: i32, log2: u32) -> i32 {
+    x.wrapping_add(1i32.wrapping_shl(log2) >> 1).wrapping_shr(log2)
+}
+
+/// Positions keep this far from the edges of picture and window, Q16 texels, beside what pixels reach to: more than rounding moves them.
+pub const MARGIN: i32 = 1 << 13;
