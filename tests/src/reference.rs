@@ -380,14 +380,14 @@ pub fn tile(cell: u32, space: u8) -> u32 {
     if space == SPACE_CUBIC { cell / 2 } else { cell }.min(8)
 }
 
-/// How far the player's positions may be off in runs of tiles, texels, in a picture 2^`width_log2` texels wide: a position, its steps along
+/// How far the player's positions may be off in tiles, texels, in a picture 2^`width_log2` texels wide: a position, its steps along
 /// both axes and how these change are each rounded to a step, and add up over a tile.
 #[must_use]
 pub fn packed(cell: u32, space: u8, width_log2: u32) -> f64 {
     let steps = match width_log2 {
         9 => 512.0,
         8 | 10 => 256.0,
-        // No runs there.
+        // No tiles there.
         _ => f64::INFINITY,
     };
     0.5 * f64::from(tile(cell, space)).powi(2) / steps
