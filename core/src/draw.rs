@@ -202,7 +202,10 @@ fn by_width<P: Paint>(paint: &P, run: Run, tiles: &[Tile], row: u32, out: &mut [
 #[inline(never)]
 fn cut<P: Paint>(paint: &P, run: Run, tiles: &[Tile], row: u32, out: &mut [P::Pixel], log2: u32, width_log2: u32) {
     let from = usize::from(run.place).wrapping_shl(log2);
-    for (tile, pixels) in tiles.iter().zip(out.get_mut(from..).unwrap_or(&mut []).chunks_mut(1 << log2)) {
+    let mut out = out.get_mut(from..).unwrap_or(&mut []);
+    for tile in tiles {
+        let (pixels, rest) = out.split_at_mut(out.len().min(1 << log2));
+        out = rest;
         let mut whole = [P::Pixel::default(); 1 << TILE_LOG2];
         if let Some(made) = whole.get_mut(..1 << log2) {
             by_width(paint, run, core::slice::from_ref(tile), row, made, log2, width_log2);
