@@ -63,7 +63,7 @@ const TEST: usize = 2;
 /// Contexts the lists are coded with.
 pub const CONTEXTS: usize = SAME + COUNT + PICK + TEST;
 
-/// The sheet lists of one key interval, in caller's memory, cell after cell: a byte of how many labels ([`COUNT_BITS`] of it) and how many more cells of
+/// The sheet lists of one key interval, in caller's memory, cell after cell: a byte of how many labels (its lower half) and how many more cells of
 /// the row go on with them, the labels and, where there is more than one, two bytes of tests. Only cells of one label go on: most do.
 #[derive(Debug, Default)]
 pub struct Lists<'m> {
