@@ -5,7 +5,7 @@ use crate::BundleError;
 use crate::atlas::Texture;
 use crate::fixed::KEY_BITS;
 use crate::format::{
-    self, ATLAS, Atlas, Envelope, FIXED, INFO, KEY_BYTES, KNOWN_FLAGS, KeyEntry, LABEL_BYTES, LABELS, LabelRecord, MAGIC, MASK, MASKED,
+    self, ATLAS, Atlas, Envelope, INFO, KEY_BYTES, KNOWN_FLAGS, KeyEntry, LABEL_BYTES, LABELS, LabelRecord, MAGIC, MASK, MASKED,
     MAX_SECTIONS, MAX_SHEETS, PACKED, PATH, Path, SPACE_CUBIC, Section, TIME_CUBIC, TexelKind, VERSION,
 };
 use crate::grid::Grid;
@@ -244,13 +244,14 @@ fn check_atlas(atlas: &Atlas<'_>) -> Result<(), BundleError> {
 
 fn check_labels<'a>(labels: &[[u8; LABEL_BYTES]], atlas: &Atlas<'_>, mask: &'a [u8]) -> Result<&'a [u8], BundleError> {
     let mut masked = false;
-    for bytes in labels {
+    for (index, bytes) in labels.iter().enumerate() {
         let label = LabelRecord::from_bytes(bytes);
         field(label.flags & !KNOWN_FLAGS == 0, "LABL flags", u32::from(label.flags))?;
         field(label.left <= label.right && u32::from(label.right) <= 1 << atlas.width_log2, "LABL right", u32::from(label.right))?;
         field(label.top <= label.bottom && label.bottom <= atlas.height, "LABL bottom", u32::from(label.bottom))?;
         masked |= label.flags & MASKED != 0;
-        field(label.flags & (MASKED | FIXED) != MASKED | FIXED, "LABL flags", u32::from(label.flags))?;
+        // The backdrop is all of its rectangle, and there is one.
+        field(!label.fixed() || index == 0 && label.flags & MASKED == 0, "LABL flags", u32::from(label.flags))?;
     }
     // A packed picture brings its mask along.
     if !masked || packs(atlas) {

@@ -3,9 +3,10 @@
 
 use crate::Bundle;
 use crate::fixed::PlayUv;
+use crate::key::{self, BACKDROP};
 use crate::lists::{CHART, FIELD};
 use crate::memory::Workspace;
-use crate::plan::{Plan, Run};
+use crate::plan::{PLAIN, Plan, Run};
 use crate::site::Site;
 use crate::span::{self, Field, Packed, Span};
 use crate::torn::{Mixed, Side};
@@ -80,8 +81,8 @@ impl<'d, 'a> Drawing<'d, 'a> {
     where
         'a: 'd,
     {
-        let Workspace { texture, rows: [_, top, bottom, _], halfway, sheets, charts, plan, palette, .. } = space;
-        let site = Site { bundle, texture: *texture, rows: [top, halfway, bottom], sheets, charts };
+        let Workspace { texture, rows: [_, top, bottom, _], halfway, sheets, charts, plan, palette, backdrop, .. } = space;
+        let site = Site { bundle, texture: *texture, rows: [top, halfway, bottom], sheets, charts, backdrop: backdrop.as_ref() };
         (Self { site, plan }, palette)
     }
 
@@ -111,6 +112,10 @@ impl<'d, 'a> Drawing<'d, 'a> {
         let out = out.get_mut(..drawn).unwrap_or(&mut []);
         let Plan { tile, run: runs, runs: count, .. } = &*self.plan;
         for &run in runs.get(..*count).unwrap_or(&[]) {
+            if run.tile == PLAIN {
+                plain(&self.site, run, log2, out, paint);
+                continue;
+            }
             let first = usize::from(run.tile);
             let Some(tiles) = tile.get(first..first.wrapping_add(run.count.into())) else { continue };
             let from = usize::from(run.place).wrapping_shl(log2);
@@ -195,6 +200,24 @@ fn by_width<P: Paint>(paint: &P, run: Run, tiles: &[Tile], row: u32, out: &mut [
         8 => paint.run::<8, 5, 0x2000>(run, tiles, row, out, log2),
         9 => paint.run::<9, 5, 0x4000>(run, tiles, row, out, log2),
         _ => paint.run::<10, 4, 0x4000>(run, tiles, row, out, log2),
+    }
+}
+
+/// A run of the backdrop's one colour.
+#[inline(never)]
+fn plain<P: Paint>(site: &Site<'_, '_, '_>, run: Run, log2: u32, out: &mut [P::Pixel], paint: &P) {
+    let [from, to] = [run.place, run.place.wrapping_add(run.count)].map(|tile| usize::from(tile).wrapping_shl(log2).min(out.len()));
+    let Some((record, pixels)) = site.backdrop.zip(out.get_mut(from..to)) else { return };
+    let uv = key::backdrop(record, [0; 2], 0, site.bundle.path().key_bits.into());
+    let uv = site.texture.clamp(uv);
+    // Tiles begin at even pixels.
+    let [even, odd] = [0, 1].map(|x| paint.at(uv, BACKDROP as u8, x));
+    let (eights, rest) = pixels.as_chunks_mut();
+    for eight in eights {
+        *eight = [even, odd, even, odd, even, odd, even, odd];
+    }
+    for (pixel, colour) in rest.iter_mut().zip([even, odd, even, odd, even, odd, even]) {
+        *pixel = colour;
     }
 }
 

@@ -13,7 +13,7 @@ const CLASSES: usize = 4;
 pub const CONTEXTS: usize = CLASSES * NUMBER_CONTEXTS;
 
 /// Codes the fields of the layers of `chain`, in row `row` of `key`, in `contexts` ([`CONTEXTS`] of them), and clears those that no cell
-/// tests, as their `traces` say: the first field of all layers, then, where the label has two, the second.
+/// tests, as their `traces` from `place` on say: the first field of all layers, then, where the label has two, the second.
 #[expect(clippy::too_many_arguments, reason = "the key's state, its memory and the chain's place are three different owners")]
 #[inline(never)]
 pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
@@ -22,7 +22,7 @@ pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
     setting: &Setting<'_, '_, L>,
     key: &mut Key<'_>,
     traces: &[Trace],
-    row: usize,
+    (row, place): (usize, usize),
     chain: Chain,
     source: &mut S,
 ) {
@@ -30,9 +30,8 @@ pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
     let strip = (setting.label)(label).flags & STRIP != 0;
     let Key { row: rows, chain: chains, fields, .. } = key;
     let line = |row: usize| key::of_row(rows, chains, row);
-    let start = line(row).first().map_or(0, |first| first.at);
-    let place = usize::from(chain.at.wrapping_sub(start)).wrapping_add(if row & 1 == 0 { 0 } else { traces.len() / 2 });
-    let traces = traces.get(place..).unwrap_or(&[]);
+    let (even, odd) = traces.split_at(traces.len() / 2);
+    let traces = if row & 1 == 0 { even } else { odd }.get(place..).unwrap_or(&[]);
     let columns = chain.first..chain.end;
     for (which, codes) in fields.iter_mut().enumerate() {
         let above = row.checked_sub(1);

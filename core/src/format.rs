@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// What a bundle starts with.
 pub const MAGIC: [u8; 6] = *b"CUBIST";
 /// The format's version.
-pub const VERSION: u16 = 4;
+pub const VERSION: u16 = 5;
 /// The most sections a bundle can hold.
 pub const MAX_SECTIONS: usize = 16;
 /// The most sheets a cell can hold: the tests of all but the last fit into 16 bits.
@@ -127,7 +127,8 @@ pub struct Atlas<'a> {
 
 /// [`LabelRecord::flags`]: the chart does not fill its rectangle; the mask says where it is.
 pub const MASKED: u8 = 1;
-/// [`LabelRecord::flags`]: the layer is an affine function of the screen position, not coded in keys.
+/// [`LabelRecord::flags`]: the label is the backdrop, fixed to the screen: its positions are an affine function of that, and keys have none of them.
+/// Only label 0 can be it.
 pub const FIXED: u8 = 2;
 /// [`LabelRecord::flags`]: the label's outline is told by two fields, distances from opposite sides, not by one.
 pub const STRIP: u8 = 4;
@@ -163,6 +164,20 @@ pub struct LabelRecord {
 }
 
 impl LabelRecord {
+    /// The label is the backdrop.
+    #[must_use]
+    #[inline]
+    pub const fn fixed(&self) -> bool {
+        self.flags & FIXED != 0
+    }
+
+    /// The backdrop is one and the same position all over the screen.
+    #[must_use]
+    #[inline]
+    pub const fn plain(&self) -> bool {
+        self.fixed() && self.step_u == 0 && self.step_v == 0
+    }
+
     /// The record's bytes.
     #[must_use]
     pub const fn to_bytes(self) -> [u8; LABEL_BYTES] {

@@ -2,13 +2,16 @@
 //! wants to say. `nodes` lays out the chains; `predict` and `field` code their layers; `row` interpolates between keys.
 
 use crate::coder::Probability;
-use crate::fixed::{KeyUv, field_distance};
+use crate::fixed::{KeyUv, PLAY_BITS, PlayUv, field_distance};
+use crate::format::LabelRecord;
 use crate::grid::Grid;
 use crate::lists::{Lists, Sheets};
 use crate::plane::{PLANE_BYTES, View};
 
 /// No place.
 pub const NONE: u16 = u16::MAX;
+/// The label of the backdrop, where there is one.
+pub const BACKDROP: u16 = 0;
 
 /// Layers of one label at neighbouring nodes of a row, one at each, in caller's memory. They stand side by side.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -18,7 +21,7 @@ pub struct Chain {
     pub first: u16,
     /// The one after the last.
     pub end: u16,
-    /// The first layer.
+    /// The first layer; the backdrop has none: the row's first.
     pub at: u16,
     /// Where the fields of the first layer stand; [`NONE`]: no cell tests any of the chain's layers.
     pub field: u16,
@@ -199,4 +202,24 @@ pub struct Setting<'s, 'm, L> {
     pub planes: &'s [[u8; PLANE_BYTES]],
     /// How this key sees each plane.
     pub views: &'s [View],
+}
+
+impl<L: Fn(u8) -> LabelRecord> Setting<'_, '_, L> {
+    /// The first label is the backdrop.
+    pub(crate) fn backdrop(&self) -> bool {
+        (self.label)(BACKDROP as u8).fixed()
+    }
+}
+
+/// Where the backdrop is at the node in `column` and `row` of a grid of cells of 2^`log2` pixels, rounded to stored units of `key_bits` fraction bits.
+#[must_use]
+pub fn backdrop(record: &LabelRecord, [column, row]: [u16; 2], log2: u32, key_bits: u32) -> PlayUv {
+    let along = |origin: u16, step: u16, index: u16| {
+        // index << log2 <= 4096 + 32 pixels, step < 2^16 of 1/16384 texel: the product fits 2^29.
+        let offset = i32::from(index).wrapping_shl(log2).wrapping_mul(i32::from(step)) >> 14u32.wrapping_sub(key_bits);
+        i32::from(origin).wrapping_add(offset)
+    };
+    let uv = KeyUv::new(along(record.origin_u, record.step_u, column), along(record.origin_v, record.step_v, row));
+    let play = |x: i32| x.wrapping_shl(PLAY_BITS.wrapping_sub(key_bits));
+    PlayUv { u: play(uv.u()), v: play(uv.v()) }
 }

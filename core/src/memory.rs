@@ -5,8 +5,8 @@ use crate::Bundle;
 use crate::atlas::Texture;
 use crate::coder::{Decoder, Probability};
 use crate::coverage::Chart;
-use crate::format::{self, SPACE_CUBIC, TexelKind};
-use crate::key::{Chain, Key};
+use crate::format::{self, LabelRecord, SPACE_CUBIC, TexelKind};
+use crate::key::{BACKDROP, Chain, Key};
 use crate::lists::{self, Lists};
 use crate::nodes::{self, Layout};
 use crate::pack::{self, Picture, Recent, Scratch};
@@ -38,6 +38,8 @@ pub struct Workspace<'m> {
     pub sheets: RowSheets<'m>,
     /// What the current strip of it shows.
     pub plan: Plan<'m>,
+    /// The backdrop, where there is one.
+    pub backdrop: Option<LabelRecord>,
 }
 
 /// Cuts slices off memory, or only counts what they would take.
@@ -116,6 +118,7 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, space: &mut Workspace<'
     let row_chains = usize::from(limits.row_chains);
     (space.palette, space.charts) = (cutter.take(bundle.texel_kind().colours()), cutter.take(bundle.label_count()));
     colours(space.palette, bundle, false);
+    space.backdrop = Some(bundle.label(BACKDROP as u8)).filter(LabelRecord::fixed);
     for (label, chart) in (0..=u8::MAX).zip(space.charts.iter_mut()) {
         *chart = Chart::new(&bundle.label(label));
     }
@@ -137,6 +140,7 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, space: &mut Workspace<'
         *lists = Lists::new(rows, data).at_most(limits.cell_sheets);
     }
     stream.slots = slots;
+    let plain = space.backdrop.is_some_and(|backdrop| backdrop.plain());
     // A row at one moment has its chains cut where either end of the interval ends one; halfway, where either row does.
     let mut node_row = |row: &mut NodeRow<'m>, cuts: usize, fields: bool| {
         row.chain = cutter.take::<Chain>(row_chains.saturating_mul(cuts).min(row_layers));
@@ -144,6 +148,7 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, space: &mut Workspace<'
         row.point = cutter.take::<Point>(row_layers);
         row.field = cutter.take::<[i16; 2]>(if fields { row_layers } else { 0 });
         row.cubic = cubic;
+        row.plain = plain;
     };
     for (place, row) in space.rows.iter_mut().enumerate() {
         if cubic || place == 1 || place == 2 {

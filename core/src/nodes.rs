@@ -3,12 +3,12 @@
 //! (or go to) `coder`, layers go to the caller's memory as a `key`.
 //!
 //! A node carries one layer for every label in the lists of the cells that touch it, in the interval before its key and
-//! in the one after.
+//! in the one after. The backdrop's have no positions, which would always be the same: only fields, where a cell tests them.
 
 use crate::coder::{Bits, Probability};
 use crate::field;
 use crate::format::{LabelRecord, MAX_NODE_LAYERS};
-use crate::key::{Chain, Key, NONE, Setting, Source};
+use crate::key::{BACKDROP, Chain, Key, NONE, Setting, Source};
 use crate::lists::{CHART, Cursor, Lists, SheetsRef};
 use crate::predict;
 pub use crate::predict::Trace;
@@ -51,21 +51,32 @@ pub fn code_row<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
     source: &mut S,
 ) {
     let Some((positions, fields)) = contexts.split_at_mut_checked(predict::CONTEXTS) else { return };
+    let backdrop = setting.backdrop();
+    let start = if row == 0 { 0 } else { target.used[0] };
     lay_out(setting, target, layout, row);
     let chains = target.chains(row).len();
     let first = target.row.get(row).map_or(0, |&at| usize::from(at));
+    // The backdrop's traces come after the others'.
+    let mut last = target.used[0].wrapping_sub(start);
     for index in first..first.wrapping_add(chains) {
         let Some(&chain) = target.chain.get(index) else { break };
-        predict::code(bits, positions, setting, target, layout.traces, row, chain, source);
+        let place = if backdrop && chain.label == BACKDROP {
+            let place = last;
+            last = place.wrapping_add(chain.nodes().into());
+            place
+        } else {
+            predict::code(bits, positions, setting, target, layout.traces, row, chain, source);
+            usize::from(chain.at).wrapping_sub(start)
+        };
         if chain.field != NONE {
-            field::code(bits, fields, setting, target, layout.traces, row, chain, source);
+            field::code(bits, fields, setting, target, layout.traces, (row, place), chain, source);
         }
     }
 }
 
 /// Finds the chains of `row`, and marks its layers' traces with what the lists say about them. What breaks the key's bounds is left out.
 #[inline(never)]
-fn lay_out<L>(setting: &Setting<'_, '_, L>, target: &mut Key<'_>, layout: &mut Layout<'_>, row: usize) {
+fn lay_out<L: Fn(u8) -> LabelRecord>(setting: &Setting<'_, '_, L>, target: &mut Key<'_>, layout: &mut Layout<'_>, row: usize) {
     if row == 0 {
         target.used = [0; 2];
         target.row.fill(0);
@@ -73,11 +84,12 @@ fn lay_out<L>(setting: &Setting<'_, '_, L>, target: &mut Key<'_>, layout: &mut L
     let first = target.row.get(row).map_or(0, |&at| usize::from(at));
     let [layers, fields] = target.used;
     let half = layout.traces.len() / 2;
-    let room = target.uv.len().saturating_sub(layers).min(half);
+    let room = [target.uv.len().saturating_sub(layers), half];
     let free = target.chain.get_mut(first..).unwrap_or(&mut []);
     let most = free.len().min(layout.order.len());
     let chains = free.get_mut(..most).unwrap_or(&mut []);
-    let mut found = Finding { chains, count: 0, marks: &mut *layout.marks, marked: 0, room };
+    let backdrop = setting.backdrop();
+    let mut found = Finding { chains, count: 0, marks: &mut *layout.marks, marked: 0, room, backdrop };
     found.walk(setting, row);
     let Finding { count, marked, .. } = found;
     let Some(chains) = free.get_mut(..count) else { return };
@@ -86,14 +98,20 @@ fn lay_out<L>(setting: &Setting<'_, '_, L>, target: &mut Key<'_>, layout: &mut L
         chain.at = place;
     }
     sort(chains);
-    let (mut layer, mut field) = (layers, fields);
-    for chain in chains {
+    let (mut layer, mut field, mut traced) = (layers, fields, 0usize);
+    let behind = if backdrop { chains.partition_point(|chain| chain.label == BACKDROP) } else { 0 };
+    let (behind, before) = chains.split_at_mut_checked(behind).unwrap_or_default();
+    for chain in before.iter_mut().chain(behind) {
         let nodes = usize::from(chain.nodes());
         if let Some(place) = layout.order.get_mut(usize::from(chain.at)) {
-            *place = layer.wrapping_sub(layers) as u16;
+            *place = traced as u16;
         }
-        chain.at = layer as u16;
-        layer = layer.wrapping_add(nodes);
+        traced = traced.wrapping_add(nodes);
+        chain.at = layers as u16;
+        if !(backdrop && chain.label == BACKDROP) {
+            chain.at = layer as u16;
+            layer = layer.wrapping_add(nodes);
+        }
         if chain.field != NONE {
             let end = field.wrapping_add(nodes);
             let fits = target.fields.first().is_some_and(|codes| end <= codes.len());
@@ -145,8 +163,10 @@ struct Finding<'f> {
     count: usize,
     marks: &'f mut [Mark],
     marked: usize,
-    /// Layers that there is room for.
-    room: usize,
+    /// Positions and traces that there is room for.
+    room: [usize; 2],
+    /// The least label has traces alone.
+    backdrop: bool,
 }
 
 impl Finding<'_> {
@@ -183,7 +203,9 @@ impl Finding<'_> {
 
     /// Puts layers at `nodes` nodes from `column` on: into one of the chains that are `open`, or into a new one. Returns which.
     fn put(&mut self, open: &[u16], found: Found, column: u16, nodes: u16) -> Option<u16> {
-        let left = self.room.checked_sub(nodes.into())?;
+        let [positions, traces] = self.room;
+        let wanted = if self.backdrop && found.label == 0 { 0 } else { usize::from(nodes) };
+        let left = [positions.checked_sub(wanted)?, traces.checked_sub(nodes.into())?];
         let mark = self.marks.get_mut(self.marked)?;
         let label = u16::from(found.label);
         let known = open.iter().copied().find(|&chain| self.chains.get(usize::from(chain)).is_some_and(|chain| chain.label == label));

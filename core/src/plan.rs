@@ -7,6 +7,7 @@
 
 use crate::coverage::Bounds;
 use crate::fixed::PlayUv;
+use crate::key::BACKDROP;
 use crate::row::Layer;
 use crate::sheet::{Block, Corners, Sheet, Stretch};
 use crate::site::Site;
@@ -21,13 +22,16 @@ pub struct Run {
     pub place: u16,
     /// How many there are.
     pub count: u16,
-    /// The first of them in memory.
+    /// The first of them in memory; [`PLAIN`]: they have none.
     pub tile: u16,
     /// The window's first row.
     pub row: u16,
     /// The label.
     pub label: u16,
 }
+
+/// [`Run::tile`]: it is all of the backdrop's one colour.
+pub const PLAIN: u16 = u16::MAX;
 
 /// A strip's blocks, in caller's memory.
 #[derive(Debug, Default)]
@@ -95,9 +99,14 @@ impl Plan<'_> {
 
     /// Plans so many `cells` that show `sheet` in this strip, and nothing else of what they have; `mixed` names it for the first of them.
     fn cells(&mut self, across: &mut Across<'_, '_, '_>, mixed: Mixed, sheet: &Sheet, cells: u16) {
-        let Across { site, window, strip, log2, width, .. } = *across;
+        let Across { site, window, strip, width, .. } = *across;
         let lines = site.lines(strip, sheet);
         let mut along = 0u16;
+        if site.plain(sheet) {
+            self.plain(across, across.blocks().wrapping_mul(cells.into()));
+            across.step(across.blocks().wrapping_mul(cells.into()));
+            return;
+        }
         while along < cells && across.left < width {
             // In pictures 512 wide, as most are, and cells of eight pixels; others go by `append` alone. Likewise the cell that the screen's edge cuts.
             if window == Some(Window::USUAL) && site.bundle.grid().log2 == 3 {
@@ -109,8 +118,7 @@ impl Plan<'_> {
                     self.extend::<2, 3>(across.block, most as usize, sheet.label(), rest)
                 };
                 along = along.wrapping_add(more);
-                across.block = across.block.wrapping_add(u32::from(more).wrapping_mul(across.blocks()));
-                across.left = across.block.wrapping_shl(log2);
+                across.step(across.blocks().wrapping_mul(more.into()));
                 if along == cells {
                     break;
                 }
@@ -121,7 +129,7 @@ impl Plan<'_> {
                 if !self.append(across, &here, place.corners(&here)) {
                     self.mix(across, Mixed { block: across.block as u16, along, ..mixed });
                 }
-                across.step();
+                across.step(1);
             }
             along = along.wrapping_add(1);
         }
@@ -143,7 +151,7 @@ impl Plan<'_> {
                         let pixels = across.width.saturating_sub(across.left).min(1 << across.log2);
                         self.tests = self.tests.wrapping_add(pixels.wrapping_mul(shown.count_ones().saturating_sub(1)));
                     }
-                    across.step();
+                    across.step(1);
                 }
             }
         }
@@ -217,6 +225,9 @@ impl Plan<'_> {
     /// appended then is drawn over.
     #[inline(never)]
     fn append(&mut self, across: &Across<'_, '_, '_>, sheet: &Sheet, [a, b, c, d]: Corners) -> bool {
+        if across.site.plain(sheet) {
+            return self.plain(across, 1);
+        }
         let Some(window) = across.window else { return false };
         let label = u16::from(sheet.label());
         let log2 = across.parts_log2;
@@ -237,6 +248,22 @@ impl Plan<'_> {
                 [between(a, b, part), between(a, b, part.wrapping_add(1)), between(c, d, part), between(c, d, part.wrapping_add(1))];
             self.tile(across, window, label, across.block.wrapping_shl(log2).wrapping_add(part) as u16, corners)
         })
+    }
+
+    /// Appends so many `blocks` of the backdrop's one colour to the last run, or begins another.
+    fn plain(&mut self, across: &Across<'_, '_, '_>, blocks: u32) -> bool {
+        let [place, count] = [across.block, blocks].map(|blocks| blocks.wrapping_shl(across.parts_log2) as u16);
+        if let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1))
+            && run.tile == PLAIN
+            && run.place.wrapping_add(run.count) == place
+        {
+            run.count = run.count.wrapping_add(count);
+            return true;
+        }
+        let Some(run) = self.run.get_mut(self.runs) else { return false };
+        *run = Run { place, count, tile: PLAIN, row: 0, label: BACKDROP };
+        self.runs = self.runs.wrapping_add(1);
+        true
     }
 
     /// Appends the tile at `place` to the last run, or begins another; false where its positions fit no window.
@@ -295,9 +322,9 @@ impl Across<'_, '_, '_> {
         self.site.block(self.block, self.strip)
     }
 
-    /// On to the next block.
-    fn step(&mut self) {
-        self.block = self.block.wrapping_add(1);
+    /// On by so many blocks.
+    fn step(&mut self, blocks: u32) {
+        self.block = self.block.wrapping_add(blocks);
         self.left = self.block.wrapping_shl(self.log2);
     }
 }

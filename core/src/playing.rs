@@ -272,7 +272,7 @@ impl<'a> Playing<'a> {
         let age = self.needed().ahead;
         let bundle = self.bundle;
         let from = self.moment.interval as isize;
-        let Workspace { stream, rows, halfway, sheets, .. } = &mut self.space;
+        let Workspace { stream, rows, halfway, sheets, backdrop, .. } = &mut self.space;
         let at = |offset: isize| {
             let inside = bundle.looping() || (0..bundle.key_count() as isize).contains(&from.wrapping_add(offset));
             stream.key(age.checked_add_signed(offset.wrapping_neg())?).filter(|_| inside)
@@ -286,6 +286,7 @@ impl<'a> Playing<'a> {
             to: at(1).unwrap_or(start),
             after: at(2).filter(|_| cubic_time),
             key_bits: u32::from(bundle.path().key_bits),
+            backdrop: backdrop.as_ref(),
         };
         let cubic = bundle.path().space == SPACE_CUBIC;
         // Going down, the rows of nodes around the last row of cells are those around this one, but for the lowest.

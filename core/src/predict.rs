@@ -7,7 +7,7 @@
 
 use crate::coder::{self, Bits, NUMBER_CONTEXTS, Probability};
 use crate::fixed::{KEY_MAX, KEY_MIN, KeyUv};
-use crate::format::{FIXED, LabelRecord};
+use crate::format::LabelRecord;
 use crate::key::{self, Chain, Key, Line, Setting, Source};
 use crate::plane::Across;
 
@@ -38,14 +38,6 @@ pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
 ) {
     let label = chain.label as u8;
     let record = (setting.label)(label);
-    if record.flags & FIXED != 0 {
-        let from = usize::from(chain.at);
-        let slots = key.uv.get_mut(from..from.wrapping_add(chain.nodes().into())).unwrap_or(&mut []);
-        for (slot, column) in slots.iter_mut().zip(chain.first..) {
-            *slot = fixed(&record, column.into(), row, setting).0;
-        }
-        return;
-    }
     let Key { row: rows, chain: chains, uv: positions, .. } = key;
     let line = |row: usize| key::of_row(rows, chains, row);
     let half = traces.len() / 2;
@@ -125,16 +117,6 @@ impl Trace {
     pub(crate) const fn tested(&self) -> bool {
         self.marks & TESTED != 0
     }
-}
-
-/// The position of a screen-fixed layer at a node: an affine function of the screen position.
-fn fixed<L>(record: &LabelRecord, column: usize, row: usize, setting: &Setting<'_, '_, L>) -> KeyUv {
-    let along = |origin: u16, step: u16, index: usize| {
-        // index << log2 <= 4096 + 32 pixels, step < 2^16 of 1/16384 texel: the product fits 2^29.
-        let offset = (index as i32).wrapping_shl(setting.grid.log2).wrapping_mul(i32::from(step)) >> 14u32.wrapping_sub(setting.key_bits);
-        i32::from(origin).wrapping_add(offset)
-    };
-    KeyUv::new(along(record.origin_u, record.step_u, column), along(record.origin_v, record.step_v, row))
 }
 
 /// What is known of a chain's label as its nodes are walked.

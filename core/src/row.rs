@@ -2,8 +2,9 @@
 //! Keys come from the caller's memory, rows go to `sheet`.
 
 use crate::fixed::{KEY_MIN, KeyUv, ONE, PLAY_BITS, PlayUv, WEIGHT_BITS, field_distance, middle};
+use crate::format::LabelRecord;
 use crate::grid::Grid;
-use crate::key::{Chain, Key, NONE};
+use crate::key::{self, BACKDROP, Chain, Key, NONE};
 use crate::timeline::{Moment, Weights};
 
 /// A layer at one moment: a [`PlayUv`] in caller's memory.
@@ -58,6 +59,8 @@ pub struct Around<'k, 'm> {
     pub after: Option<&'k Key<'m>>,
     /// Fraction bits of coordinates in keys.
     pub key_bits: u32,
+    /// The backdrop, where there is one: keys have no positions of it.
+    pub backdrop: Option<&'k LabelRecord>,
 }
 
 /// The field between those that two codes stand for, Q8 pixels.
@@ -155,6 +158,8 @@ pub struct NodeRow<'m> {
     pub point: &'m mut [Point],
     /// Space is cubic: what is halfway between points is wanted.
     pub cubic: bool,
+    /// The backdrop is one position: nothing has to be worked out halfway.
+    pub plain: bool,
     /// Fields, Q8 pixels; empty where the bundle has none.
     pub field: &'m mut [[i16; 2]],
 }
@@ -194,7 +199,10 @@ impl NodeRow<'_> {
             while let Some(end) = to.from(start.label, column).filter(|end| end.first < start.end) {
                 let (first, stop) = (column.max(end.first), start.end.min(end.end));
                 let Some(chain) = self.open(start.label, first, stop, count) else { return count as u32 };
-                self.weigh(chain, [start, end], keys, moment, [&mut before, &mut after]);
+                match keys.backdrop {
+                    Some(record) if chain.label == BACKDROP => self.stand(chain, record, grid, row, keys.key_bits),
+                    _ => self.weigh(chain, [start, end], keys, moment, [&mut before, &mut after]),
+                }
                 self.distances(chain, [start, end], keys, moment.linear);
                 count = count.wrapping_add(chain.nodes().into());
                 column = stop;
@@ -205,6 +213,25 @@ impl NodeRow<'_> {
         }
         self.halve();
         count as u32
+    }
+
+    /// Fills in the layers of the backdrop's `chain`, which stands still.
+    #[inline(never)]
+    fn stand(&mut self, chain: Chain, record: &LabelRecord, grid: Grid, row: usize, key_bits: u32) {
+        let slots = self.point.get_mut(usize::from(chain.at)..).unwrap_or(&mut []);
+        let slots = slots.get_mut(..chain.nodes().into()).unwrap_or(&mut []);
+        let layer = |column: u16| {
+            let PlayUv { u, v } = key::backdrop(record, [column, row as u16], grid.log2, key_bits);
+            Layer { u, v }
+        };
+        if self.plain {
+            let at = layer(0);
+            slots.fill(Point { at, middle: at });
+            return;
+        }
+        for (slot, column) in slots.iter_mut().zip(chain.first..) {
+            slot.at = layer(column);
+        }
     }
 
     /// Works out the layers of `chain`, which are in both `ends` of the interval; outer keys that lack one weigh nothing.
@@ -286,6 +313,10 @@ impl NodeRow<'_> {
                 let mut slots = slots.get_mut(..chain.nodes().into()).unwrap_or(&mut []);
                 count = count.wrapping_add(slots.len());
                 column = first;
+                if self.plain && chain.label == BACKDROP {
+                    slots.fill(upper.get(usize::from(start.at)).copied().unwrap_or_default());
+                    slots = &mut [];
+                }
                 let mut here = cut(start, upper, first);
                 let mut there = cut(end, bottom, first);
                 while !slots.is_empty() {
@@ -327,6 +358,9 @@ impl NodeRow<'_> {
         for chain in self.chain.get(..self.chains).unwrap_or(&[]) {
             let Some((mine, rest)) = points.split_at_mut_checked(chain.nodes().into()) else { break };
             points = rest;
+            if self.plain && chain.label == BACKDROP {
+                continue;
+            }
             // Each point waits for two more.
             let mut mine = mine.iter_mut();
             let (Some(mut last), Some(mut here)) = (mine.next(), mine.next()) else { continue };

@@ -4,7 +4,8 @@
 use crate::Bundle;
 use crate::atlas::Texture;
 use crate::coverage::Chart;
-use crate::format::SPACE_CUBIC;
+use crate::format::{LabelRecord, SPACE_CUBIC};
+use crate::key::BACKDROP;
 use crate::row::Layer;
 use crate::sheet::{Block, RowSheets, Rows, Sheet};
 use crate::window::TILE_LOG2;
@@ -22,9 +23,18 @@ pub struct Site<'s, 'a, 'm> {
     pub sheets: &'s RowSheets<'m>,
     /// Every label's chart.
     pub charts: &'s [Chart],
+    /// The backdrop, where there is one.
+    pub backdrop: Option<&'s LabelRecord>,
 }
 
 impl Site<'_, '_, '_> {
+    /// The sheet is the backdrop, and of one colour.
+    #[must_use]
+    #[inline(always)]
+    pub fn plain(&self, sheet: &Sheet) -> bool {
+        u16::from(sheet.label()) == BACKDROP && self.backdrop.is_some_and(LabelRecord::plain)
+    }
+
     /// The chart of a sheet's label.
     #[must_use]
     #[inline(always)]

@@ -42,6 +42,8 @@ pub struct Window {
 impl Window {
     /// That of pictures 512 texels wide, as most are: what is made for it has code of its own.
     pub const USUAL: Self = Self { width_log2: 9, rows_log2: 5 };
+    /// That of pictures 256 texels wide.
+    const NARROW: Self = Self { width_log2: 8, rows_log2: 5 };
 
     /// The window for pictures 2^`width_log2` texels wide and `height` high: the fraction bits are shared out so that a texel
     /// has at least 256 steps.
@@ -105,6 +107,7 @@ impl Window {
         match (self, log2) {
             (Self::USUAL, 2) => Self::USUAL.packed(corners, row, 2),
             (Self::USUAL, 3) => Self::USUAL.packed(corners, row, 3),
+            (Self::NARROW, 2) => Self::NARROW.packed(corners, row, 2),
             _ => self.any_tile(corners, row, log2),
         }
     }

@@ -5,10 +5,10 @@
 use cubist_baker::encode::unpacked;
 use cubist_core::Bundle;
 use cubist_core::coder::{Decoder, Probability};
-use cubist_core::fixed::ONE;
+use cubist_core::fixed::{ONE, PlayUv};
 use cubist_core::format::{MASKED, SPACE_CUBIC, STRIP, TIME_CUBIC, TIME_HOLD, TIME_LINEAR, TexelKind};
 use cubist_core::grid::Grid;
-use cubist_core::key::{Chain, Key, Nothing};
+use cubist_core::key::{self, Chain, Key, Nothing};
 use cubist_core::lists::{self, CHART, FIELD, Lists};
 use cubist_core::nodes::{self, Layout, Mark, Trace};
 use cubist_core::plane::View;
@@ -146,7 +146,7 @@ impl<'a> Reference<'a> {
         for key in 0..bundle.key_count() {
             run = if bundle.key(key).independent { 0 } else { run + 1 };
             stream.code(&mut Decoder::new(bundle.record(key)), shape, bundle.place(key, run), &mut Nothing);
-            reference.keys.extend(stream.key(0).map(|key| nodes(key, grid, path.key_bits)));
+            reference.keys.extend(stream.key(0).map(|key| nodes(key, grid, bundle)));
             reference.lists.extend(stream.lists(0).map(|lists| cells(lists, grid)));
         }
         reference
@@ -411,16 +411,23 @@ fn bilinear([a, b, c, d]: &[[f64; 2]; 4], [x, y]: [f64; 2]) -> [f64; 2] {
 }
 
 /// The layers of every node of a key.
-fn nodes(key: &Key<'_>, grid: Grid, key_bits: u8) -> Vec<Vec<Layer>> {
+fn nodes(key: &Key<'_>, grid: Grid, bundle: &Bundle<'_>) -> Vec<Vec<Layer>> {
+    let key_bits = u32::from(bundle.path().key_bits);
     let stored = 1.0 / f64::from(1u32 << key_bits);
     let mut layers = vec![Vec::new(); grid.nodes()];
     for row in 0..grid.node_rows() {
         for chain in key.chains(row) {
             for along in 0..chain.nodes() {
+                let (label, column) = (chain.label as u8, chain.first + along);
+                let record = bundle.label(label);
                 let uv = key.uv(usize::from(chain.at + along));
-                layers[row * grid.node_columns() + usize::from(chain.first + along)].push(Layer {
-                    label: chain.label as u8,
-                    at: [uv.u(), uv.v()].map(|x| f64::from(x) * stored),
+                let at = match key::backdrop(&record, [column, row as u16], grid.log2, key_bits) {
+                    PlayUv { u, v } if record.fixed() => [u, v].map(|x| f64::from(x) / 65_536.0),
+                    _ => [uv.u(), uv.v()].map(|x| f64::from(x) * stored),
+                };
+                layers[row * grid.node_columns() + usize::from(column)].push(Layer {
+                    label,
+                    at,
                     fields: key.field(chain, along).map(|distance| f64::from(distance) * DISTANCE),
                 });
             }

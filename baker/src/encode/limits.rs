@@ -55,7 +55,7 @@ pub(super) fn of(content: &Content<'_>, labels: &[LabelRecord], settings: Coding
     Ok(Limits {
         key_layers,
         row_layers,
-        // No more of them than layers; how many there are turns out as they are coded.
+        // No more of them than layers; how many there are turns out as they are coded, and how many layers have positions.
         key_chains: key_layers,
         row_chains: row_layers,
         key_fields: key_layers,

@@ -169,7 +169,7 @@ fn keys(
 ) -> (Vec<u8>, Vec<u8>) {
     let grid = content.grid;
     let mut memory = Memory::new(grid, *bounds, planes.len());
-    (bounds.key_chains, bounds.row_chains, bounds.key_fields) = (0, 0, 0);
+    (bounds.key_layers, bounds.key_chains, bounds.row_chains, bounds.key_fields) = (0, 0, 0, 0);
     let mut stream = memory.stream();
     let shape = Shape {
         grid: grid.grid,
@@ -197,7 +197,8 @@ fn keys(
             let chains = (0..grid.grid.node_rows()).map(|row| key.chains(row).len() as u16);
             bounds.key_chains = bounds.key_chains.max(chains.clone().sum());
             bounds.row_chains = bounds.row_chains.max(chains.max().unwrap_or(0));
-            let [_, fields] = key.held();
+            let [layers, fields] = key.held();
+            bounds.key_layers = bounds.key_layers.max(layers as u16);
             bounds.key_fields = bounds.key_fields.max(fields as u16);
         }
         records.extend(encoder.finish());
