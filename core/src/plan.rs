@@ -12,7 +12,7 @@ use crate::row::Layer;
 use crate::sheet::{Block, Corners, Sheet, Stretch};
 use crate::site::Site;
 use crate::torn::{self, Mixed, Side};
-use crate::window::{MARGIN, Tile, Window};
+use crate::window::{self, Tile, Window};
 
 /// Neighbouring tiles that show one sheet of one label, in caller's memory.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
@@ -58,6 +58,8 @@ pub struct Plan<'m> {
     pub strip: Option<u32>,
     /// How far around a position pixels are told from, Q16 texels.
     pub reach: i32,
+    /// How far from the edges of windows positions are for that.
+    pub margin: i32,
     /// Mixed blocks are not asked for their sides.
     pub sideless: bool,
     /// Pixels of a row in cells of one sheet.
@@ -76,6 +78,7 @@ impl Plan<'_> {
         (self.tiles, self.runs, self.mixes, self.sides, self.plain) = (0, 0, 0, 0, 0);
         (self.smooth, self.torn, self.tests) = (0, 0, 0);
         (self.strip, self.reach, self.sideless) = (Some(strip), reach, sideless);
+        self.margin = window::margin(site.tile_log2()).wrapping_add(reach);
         let texture = site.bundle.texture();
         let window = Window::new(texture.width_log2, texture.height);
         let (log2, width) = (site.log2(), site.bundle.size().0);
@@ -175,7 +178,7 @@ impl Plan<'_> {
         let window: Window = Window::USUAL;
         let first = i32::from(run.row).wrapping_shl(16);
         // Inside as far as the margin from either side: sums of both are below a power of two.
-        let margin = MARGIN.wrapping_add(self.reach);
+        let margin = self.margin;
         let inside = |x: i32, y: i32, log2: u32| {
             let [less, more] = [x, y].map(|x| (x.wrapping_sub(margin) | x.wrapping_add(margin)) as u32);
             (less | more) >> log2.wrapping_add(16) == 0
@@ -213,7 +216,7 @@ impl Plan<'_> {
     fn mix(&mut self, across: &Across<'_, '_, '_>, mixed: Mixed) {
         let free = self.side.get_mut(self.sides..).unwrap_or(&mut []);
         let window = across.window.filter(|_| !self.sideless);
-        let sides = window.and_then(|window| mixed.share(across.site, across.strip, window, self.reach, free)).unwrap_or(0);
+        let sides = window.and_then(|window| mixed.share(across.site, across.strip, window, self.margin, free)).unwrap_or(0);
         if let Some(slot) = self.mixed.get_mut(self.mixes) {
             *slot = Mixed { sides: sides as u16, ..mixed };
             (self.mixes, self.sides) = (self.mixes.wrapping_add(1), self.sides.wrapping_add(sides));
@@ -275,7 +278,7 @@ impl Plan<'_> {
         if let Some(run) = self.run.get_mut(last)
             && run.label == label
             && run.place.wrapping_add(run.count) == place
-            && window.holds(&bounds, run.row, self.reach)
+            && window.holds(&bounds, run.row, self.margin)
         {
             *slot = window.tile(corners, run.row, log2);
             run.count = run.count.wrapping_add(1);
@@ -285,7 +288,7 @@ impl Plan<'_> {
         // The window begins or ends at the tile, so that it has room where the run is heading.
         let ([a, b, c, d], height) = (corners, across.site.texture.height);
         let onwards = b.v.wrapping_add(d.v) >= a.v.wrapping_add(c.v);
-        let row = if onwards { window.row(&bounds, height, self.reach) } else { window.row_to(&bounds, height, self.reach) };
+        let row = if onwards { window.row(&bounds, height, self.margin) } else { window.row_to(&bounds, height, self.margin) };
         let Some(row) = row else { return false };
         let Some(run) = self.run.get_mut(self.runs) else { return false };
         *slot = window.tile(corners, row, log2);

@@ -104,10 +104,10 @@ impl Shown {
 pub const SIDES_LOG2: u32 = 3;
 
 impl Mixed {
-    /// Works out the block's sides in strip `strip`, for pixels that are told from as far as `reach` around a position; how many of the `slots` they take.
+    /// Works out the block's sides in strip `strip`, for positions as far as `margin` from the edges of windows; how many of the `slots` they take.
     /// `None` where positions fit no window, there is no room, or blocks of such a size have no sides. The frontmost sheet that covers a pixel shows.
     #[inline(never)]
-    pub fn share(&self, site: &Site<'_, '_, '_>, strip: u32, window: Window, reach: i32, slots: &mut [Side]) -> Option<usize> {
+    pub fn share(&self, site: &Site<'_, '_, '_>, strip: u32, window: Window, margin: i32, slots: &mut [Side]) -> Option<usize> {
         let log2 = site.log2();
         if log2 != 2 && log2 != SIDES_LOG2 {
             return None;
@@ -148,7 +148,7 @@ impl Mixed {
             left = left.and_not(shown);
             let height = site.texture.height;
             // What does not show may lie anywhere.
-            let row = window.row(&bounds, height, reach).or_else(|| window.row(&shown.bounds(corners, log2), height, reach))?;
+            let row = window.row(&bounds, height, margin).or_else(|| window.row(&shown.bounds(corners, log2), height, margin))?;
             *slots.get_mut(sides)? =
                 Side { tile: window.tile(corners, row, log2), shown, block: self.block, row, label: sheet.label().into() };
             sides = sides.wrapping_add(1);

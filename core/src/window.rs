@@ -54,11 +54,10 @@ impl Window {
         if known && height >= 1 << rows_log2 { Some(Self { width_log2, rows_log2 }) } else { None }
     }
 
-    /// Whether what lies within `bounds` is inside the window from `row` on, and the picture, for pixels that are told from as far as `reach` around it.
+    /// Whether what lies within `bounds` is inside the window from `row` on, and the picture, as far as `margin` from the edges of either.
     #[must_use]
     #[inline(always)]
-    pub const fn holds(self, &Bounds { low, high }: &Bounds, row: u16, reach: i32) -> bool {
-        let margin = MARGIN.wrapping_add(reach);
+    pub const fn holds(self, &Bounds { low, high }: &Bounds, row: u16, margin: i32) -> bool {
         let first = (row as i32).wrapping_shl(16);
         let (right, end) = (1i32.wrapping_shl(self.width_log2.wrapping_add(16)), 1i32.wrapping_shl(self.rows_log2.wrapping_add(16)));
         low.u >= margin
@@ -70,23 +69,23 @@ impl Window {
     /// The first row of a window, in a picture `height` high, that holds what lies within `bounds` and begins there; `None` where there is no such.
     #[must_use]
     #[inline(always)]
-    pub fn row(self, bounds: &Bounds, height: u32, reach: i32) -> Option<u16> {
-        self.held(bounds, bounds.low.v.wrapping_sub(MARGIN.wrapping_add(reach)) >> 16, height, reach)
+    pub fn row(self, bounds: &Bounds, height: u32, margin: i32) -> Option<u16> {
+        self.held(bounds, bounds.low.v.wrapping_sub(margin) >> 16, height, margin)
     }
 
     /// Likewise of one that ends where they do.
     #[must_use]
     #[inline(always)]
-    pub fn row_to(self, bounds: &Bounds, height: u32, reach: i32) -> Option<u16> {
-        let end = (bounds.high.v.wrapping_add(MARGIN.wrapping_add(reach)) >> 16).wrapping_add(1);
-        self.held(bounds, end.wrapping_sub(1i32.wrapping_shl(self.rows_log2)), height, reach)
+    pub fn row_to(self, bounds: &Bounds, height: u32, margin: i32) -> Option<u16> {
+        let end = (bounds.high.v.wrapping_add(margin) >> 16).wrapping_add(1);
+        self.held(bounds, end.wrapping_sub(1i32.wrapping_shl(self.rows_log2)), height, margin)
     }
 
     /// The row of the picture that comes closest to `row`, if the window from there on holds what lies within `bounds`.
     #[inline(always)]
-    fn held(self, bounds: &Bounds, row: i32, height: u32, reach: i32) -> Option<u16> {
+    fn held(self, bounds: &Bounds, row: i32, height: u32, margin: i32) -> Option<u16> {
         let row = row.min(height.wrapping_sub(1u32.wrapping_shl(self.rows_log2)) as i32).max(0) as u16;
-        Some(row).filter(|&row| self.holds(bounds, row, reach))
+        Some(row).filter(|&row| self.holds(bounds, row, margin))
     }
 
     /// A difference of u and v in Q16 texels, or a position with v from the window's first row on, as [`crate::span::Packed`] holds it,
@@ -136,5 +135,9 @@ const fn rounded(x: i32, log2: u32) -> i32 {
     x.wrapping_add(1i32.wrapping_shl(log2) >> 1).wrapping_shr(log2)
 }
 
-/// Positions keep this far from the edges of picture and window, Q16 texels, beside what pixels reach to: more than rounding moves them.
-pub const MARGIN: i32 = 1 << 13;
+/// How far positions of tiles of 2^`log2` pixels keep from the edges of picture and window, Q16 texels, beside what pixels reach to: rounding moves
+/// them by less. The steps between their pixels, and from row to row, are off by up to half a unit, 1/512 texel at most; all of a tile's add up.
+#[must_use]
+pub const fn margin(log2: u32) -> i32 {
+    1i32.wrapping_shl(log2.wrapping_mul(2).wrapping_add(7))
+}
