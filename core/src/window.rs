@@ -41,15 +41,15 @@ pub struct Window {
 
 impl Window {
     /// That of pictures 512 texels wide, as most are: what is made for it has code of its own.
-    pub const USUAL: Self = Self { width_log2: 9, rows_log2: 5 };
+    pub const USUAL: Self = Self { width_log2: 9, rows_log2: 6 };
     /// That of pictures 256 texels wide.
-    const NARROW: Self = Self { width_log2: 8, rows_log2: 5 };
+    const NARROW: Self = Self { width_log2: 8, rows_log2: 6 };
 
     /// The window for pictures 2^`width_log2` texels wide and `height` high: the fraction bits are shared out so that a texel
     /// has at least 256 steps.
     #[must_use]
     pub const fn new(width_log2: u32, height: u32) -> Option<Self> {
-        let rows_log2 = if width_log2 == 10 { 4 } else { 5 };
+        let rows_log2 = match width_log2 { 10 => 4, _ => 6 };
         let known = matches!(width_log2, 8..=10);
         if known && height >= 1 << rows_log2 { Some(Self { width_log2, rows_log2 }) } else { None }
     }
