@@ -337,8 +337,8 @@ impl Colours for Colours4<'_> {
     ) {
         // Half of TEXELS, which is one of two numbers.
         match TEXELS {
-            0x2000 => self.window::<_, WIDTH, ROWS, 0x1000>(filter, run, tiles, row, out, log2),
-            _ => self.window::<_, WIDTH, ROWS, 0x2000>(filter, run, tiles, row, out, log2),
+            0x4000 => self.window::<_, WIDTH, ROWS, 0x2000>(filter, run, tiles, row, out, log2),
+            _ => self.window::<_, WIDTH, ROWS, 0x4000>(filter, run, tiles, row, out, log2),
         }
     }
 }

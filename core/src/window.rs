@@ -49,7 +49,10 @@ impl Window {
     /// has at least 256 steps.
     #[must_use]
     pub const fn new(width_log2: u32, height: u32) -> Option<Self> {
-        let rows_log2 = match width_log2 { 10 => 4, _ => 6 };
+        let rows_log2 = match width_log2 {
+            10 => 4,
+            _ => 6,
+        };
         let known = matches!(width_log2, 8..=10);
         if known && height >= 1 << rows_log2 { Some(Self { width_log2, rows_log2 }) } else { None }
     }

@@ -22,6 +22,16 @@ pub fn reduced(name: &str, size: [u32; 2], frames: u32) -> Result<Scene> {
     Ok(scene)
 }
 
+/// Likewise without its sky, which is far away: what stands before it stands before the background.
+///
+/// # Errors
+/// There is no scene of that name.
+pub fn without_sky(name: &str, size: [u32; 2], frames: u32) -> Result<Scene> {
+    let mut scene = reduced(name, size, frames)?;
+    scene.triangles.retain(|triangle| triangle.position.iter().all(|corner| corner.length() < 100.0));
+    Ok(scene)
+}
+
 /// Bakes `scene` in silence; gives the bundle and what it was made from.
 ///
 /// # Errors

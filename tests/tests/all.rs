@@ -2,6 +2,7 @@
 
 mod ahead;
 mod architecture;
+mod backdrop;
 mod borrow;
 mod determinism;
 mod differential;
