@@ -213,6 +213,8 @@ impl<L: Fn(u8) -> LabelRecord> Setting<'_, '_, L> {
 
 /// Where the backdrop is at the node in `column` and `row` of a grid of cells of 2^`log2` pixels, rounded to stored units of `key_bits` fraction bits.
 #[must_use]
+// Most backdrops are one position: what others take is not worth its code twice.
+#[inline(never)]
 pub fn backdrop(record: &LabelRecord, [column, row]: [u16; 2], log2: u32, key_bits: u32) -> PlayUv {
     let along = |origin: u16, step: u16, index: u16| {
         // index << log2 <= 4096 + 32 pixels, step < 2^16 of 1/16384 texel: the product fits 2^29.
