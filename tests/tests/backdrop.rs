@@ -38,3 +38,14 @@ fn a_backdrop_of_one_colour_is_filled_in_as_it_would_be_drawn() {
         assert!(ways(&raw) == ways(&drawn(&raw)), "{name}, cells of {cell}");
     }
 }
+
+#[test]
+fn keys_have_no_positions_of_a_backdrop() {
+    let scene = scenes::without_sky("wing", [104, 80], 9).expect("a built-in scene");
+    let [raw, _] = scenes::raw_and_packed(&scene, &Settings::default()).expect("it bakes").1;
+    let bundle = Bundle::parse(&raw).expect("the baker's bytes parse");
+    // Every node carries a layer at least, but most carry that of the backdrop alone.
+    let nodes = (104 / 8 + 1) * (80 / 8 + 1);
+    let layers = usize::from(bundle.limits().key_layers);
+    assert!(2 * layers < nodes, "{layers} positions at {nodes} nodes");
+}
