@@ -112,13 +112,15 @@ impl Plan<'_> {
         }
         while along < cells && across.left < width {
             // In pictures 512 wide, as most are, and cells of eight pixels; others go by `append` alone. Likewise the cell that the screen's edge cuts.
-            if window == Some(Window::USUAL) && site.bundle.grid().log2 == 3 {
+            if let Some(usual) = window.filter(|&window| window == Window::USUAL || window == Window::NARROW && site.cubic())
+                && site.bundle.grid().log2 == 3
+            {
                 let most = (width.saturating_sub(across.left) >> 3).min(cells.wrapping_sub(along).into());
                 let rest = lines.map(|line| line.get(usize::from(along).wrapping_mul(2)..).unwrap_or(&[]));
-                let more = if site.cubic() {
-                    self.extend::<1, 2>(across.block, most as usize, sheet.label(), rest)
-                } else {
-                    self.extend::<2, 3>(across.block, most as usize, sheet.label(), rest)
+                let more = match (site.cubic(), usual == Window::USUAL) {
+                    (true, true) => self.extend::<9, 1, 2>(across.block, most as usize, sheet.label(), rest),
+                    (true, false) => self.extend::<8, 1, 2>(across.block, most as usize, sheet.label(), rest),
+                    (false, _) => self.extend::<9, 2, 3>(across.block, most as usize, sheet.label(), rest),
                 };
                 along = along.wrapping_add(more);
                 across.step(across.blocks().wrapping_mul(more.into()));
@@ -167,7 +169,7 @@ impl Plan<'_> {
     /// at most; returns how many. `above` and `below` start at their left corners: nodes, and halfway to the next. Tiles of 2^LOG2 pixels are between
     /// every EVERY-th of these: two a cell, or one, where what is halfway is skipped.
     #[inline(never)]
-    fn extend<const EVERY: usize, const LOG2: u32>(&mut self, place: u32, most: usize, label: u8, [above, below]: [&[Layer]; 2]) -> u16 {
+    fn extend<const WIDTH: u32, const EVERY: usize, const LOG2: u32>(&mut self, place: u32, most: usize, label: u8, [above, below]: [&[Layer]; 2]) -> u16 {
         let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return 0 };
         if run.label != u16::from(label) || u32::from(run.place).wrapping_add(u32::from(run.count)) != place {
             return 0;
@@ -175,7 +177,7 @@ impl Plan<'_> {
         let Some(slots) = self.tile.get_mut(self.tiles..) else { return 0 };
         let tiles = 3usize.wrapping_sub(EVERY);
         let Some(slots) = slots.get_mut(..most.wrapping_mul(tiles)) else { return 0 };
-        let window: Window = Window::USUAL;
+        let window = Window { width_log2: WIDTH, ..Window::USUAL };
         let first = i32::from(run.row).wrapping_shl(16);
         // Inside as far as the margin from either side: sums of both are below a power of two.
         let margin = self.margin;

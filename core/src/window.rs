@@ -43,7 +43,7 @@ impl Window {
     /// That of pictures 512 texels wide, as most are: what is made for it has code of its own.
     pub const USUAL: Self = Self { width_log2: 9, rows_log2: 6 };
     /// That of pictures 256 texels wide.
-    const NARROW: Self = Self { width_log2: 8, rows_log2: 6 };
+    pub const NARROW: Self = Self { width_log2: 8, rows_log2: 6 };
 
     /// The window for pictures 2^`width_log2` texels wide and `height` high: the fraction bits are shared out so that a texel
     /// has at least 256 steps.
