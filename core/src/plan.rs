@@ -169,7 +169,13 @@ impl Plan<'_> {
     /// at most; returns how many. `above` and `below` start at their left corners: nodes, and halfway to the next. Tiles of 2^LOG2 pixels are between
     /// every EVERY-th of these: two a cell, or one, where what is halfway is skipped.
     #[inline(never)]
-    fn extend<const WIDTH: u32, const EVERY: usize, const LOG2: u32>(&mut self, place: u32, most: usize, label: u8, [above, below]: [&[Layer]; 2]) -> u16 {
+    fn extend<const WIDTH: u32, const EVERY: usize, const LOG2: u32>(
+        &mut self,
+        place: u32,
+        most: usize,
+        label: u8,
+        [above, below]: [&[Layer]; 2],
+    ) -> u16 {
         let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return 0 };
         if run.label != u16::from(label) || u32::from(run.place).wrapping_add(u32::from(run.count)) != place {
             return 0;
