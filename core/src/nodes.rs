@@ -35,7 +35,7 @@ pub struct Mark {
     /// The chain, counted as they begin.
     chain: u16,
     nodes: u16,
-    /// Of [`Trace::marked`].
+    /// For [`Trace::marked`].
     marks: u16,
 }
 
@@ -219,7 +219,7 @@ impl Finding<'_> {
         if found.tested {
             chain.field = 0;
         }
-        *mark = Mark { chain: index, nodes, marks: Trace::marks(found.support, found.tested) };
+        *mark = Mark { chain: index, nodes, marks: Trace::said(found.support, found.tested) };
         (self.marked, self.room) = (self.marked.wrapping_add(1), left);
         Some(index)
     }

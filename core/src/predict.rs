@@ -37,7 +37,6 @@ pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
     source: &mut S,
 ) {
     let label = chain.label as u8;
-    let record = (setting.label)(label);
     let Key { row: rows, chain: chains, uv: positions, .. } = key;
     let line = |row: usize| key::of_row(rows, chains, row);
     let half = traces.len() / 2;
@@ -45,20 +44,22 @@ pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
     let (above, here) = if row & 1 == 0 { (&*odd, even) } else { (&*even, odd) };
     let start = line(row).first().map_or(0, |first| first.at);
     let mut known = Known::new(setting, line, row, chain);
-    let mut place = usize::from(chain.at.wrapping_sub(start));
+    let mut near = known.at(positions, above, chain.first);
+    let here = here.get_mut(usize::from(chain.at.wrapping_sub(start))..).unwrap_or(&mut []);
     let mut node = row.wrapping_mul(setting.grid.node_columns()).wrapping_add(chain.first.into());
-    for (layer, column) in (usize::from(chain.at)..).zip(chain.first..chain.end) {
-        let west = if column == chain.first { None } else { here.get(place.wrapping_sub(1)) };
-        let around = known.around(positions, above, west, column);
-        let Some(marks) = here.get(place).map(|trace| trace.marks) else { break };
-        let candidates = known.candidates(&around, column);
-        let (predicted, noise) = candidates.choose(&around, &record, setting.key_bits);
+    for ((trace, layer), column) in here.iter_mut().zip(usize::from(chain.at)..).zip(chain.first..chain.end) {
+        near.ahead = known.over(positions, above, column.wrapping_add(1));
+        near.far_north = if near.north.there() { known.far_north.layer(column).and_then(|layer| position(positions, layer)) } else { None };
+        let sums = near.sums();
+        let candidates = Candidates::new(&near, &sums, &mut known, column);
+        let predicted = candidates.best(&sums).unwrap_or_else(|| near.guess(&(setting.label)(label), setting.key_bits));
         let round = |x: i32| {
             let half = (1i32 << setting.step_log2) >> 1;
             (x.clamp(KEY_MIN, KEY_MAX).wrapping_add(half)) >> setting.step_log2 << setting.step_log2
         };
         let predicted = predicted.map(round);
-        let class = usize::from(marks & SUPPORTED == 0).wrapping_mul(NOISE_CLASSES).wrapping_add(noise);
+        let marks = trace.marks();
+        let class = usize::from(marks & SUPPORTED == 0).wrapping_mul(NOISE_CLASSES).wrapping_add(sums.noise_class());
         let at = class.wrapping_mul(2 * NUMBER_CONTEXTS);
         let Some((along_u, rest)) = contexts.get_mut(at..).and_then(|c| c.split_at_mut_checked(NUMBER_CONTEXTS)) else { break };
         let Some((along_v, _)) = rest.split_at_mut_checked(NUMBER_CONTEXTS) else { break };
@@ -66,12 +67,12 @@ pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
         let residual = [coder::number(bits, along_u, u), coder::number(bits, along_v, v)];
         let [[u, v], [du, dv]] = [predicted, residual];
         let uv = KeyUv::new(u.wrapping_add(du.wrapping_shl(setting.step_log2)), v.wrapping_add(dv.wrapping_shl(setting.step_log2)));
-        if let Some((slot, trace)) = positions.get_mut(layer).zip(here.get_mut(place)) {
+        if let Some(slot) = positions.get_mut(layer) {
             *slot = uv.0;
             *trace = candidates.trace(uv, residual, setting.step_log2, marks);
         }
-        known.step(uv);
-        (place, node) = (place.wrapping_add(1), node.wrapping_add(1));
+        near.step(pair(uv), *trace);
+        node = node.wrapping_add(1);
     }
 }
 
@@ -79,152 +80,215 @@ pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Trace {
-    /// How far off each predictor was, steps, saturating: a byte each, four in a word, the first lowest.
-    error: [u32; WORDS],
+    /// How far off each predictor was, steps, saturating: a byte each, the first lowest; then how large the residual was, steps, up to [`MOST_NOISE`];
+    /// then marks. Sums of four neighbours' are made of all at once.
+    bytes: [u32; 2],
     /// Position less temporal prediction, stored units, saturating.
     correction: [i16; 2],
     /// Position less what its plane tells, stored units, saturating.
     offset: [i16; 2],
-    /// The residual that was coded, steps, saturating.
-    noise: u16,
-    /// [`TEMPORAL`], [`FLAT`], [`SUPPORTED`] and [`TESTED`].
-    marks: u16,
 }
 
-/// Words of predictors' errors.
-const WORDS: usize = PREDICTORS.div_ceil(4);
-/// [`Trace::marks`]: there was a temporal prediction.
-const TEMPORAL: u16 = 1;
-/// [`Trace::marks`]: there was a plane.
-const FLAT: u16 = 2;
-/// [`Trace::marks`]: most cells around the node show the label.
-const SUPPORTED: u16 = 4;
+/// Where [`Trace::marks`] begin in the second word: above the last predictor's error.
+const MARKS: u32 = 16;
+const _: () = assert!(PREDICTORS == 6, "their errors are six bytes of eight");
+/// Noise, the lowest bits of the marks: as large a residual as this, of one neighbour of four, makes for the last class.
+const MOST_NOISE: i32 = 127;
 /// [`Trace::marks`]: some cell tests the layer's fields.
-const TESTED: u16 = 8;
+const TESTED: u32 = 1 << 7;
+/// [`Trace::marks`]: there was a temporal prediction. In three bits each, up to four of these are counted.
+const TEMPORAL: u32 = 1 << 8;
+/// [`Trace::marks`]: there was a plane.
+const FLAT: u32 = 1 << 11;
+/// [`Trace::marks`]: the layer is coded.
+const THERE: u32 = 1 << 14;
+/// [`Trace::marks`]: most cells around the node show the label. Until it is coded.
+const SUPPORTED: u32 = 1 << 15;
 
 impl Trace {
     /// What sheet lists say of a layer: `support` cells around its node show its label, and some cell `tested` its fields.
-    pub(crate) const fn marks(support: u8, tested: bool) -> u16 {
-        (if support >= 5 { SUPPORTED } else { 0 }) | if tested { TESTED } else { 0 }
+    pub(crate) const fn said(support: u8, tested: bool) -> u16 {
+        ((if support >= 5 { SUPPORTED } else { 0 }) | if tested { TESTED } else { 0 }) as u16
     }
 
     /// The trace of a layer that is not coded yet.
     pub(crate) fn marked(marks: u16) -> Self {
-        Self { marks, ..Self::default() }
+        Self { bytes: [0, u32::from(marks) << MARKS], ..Self::default() }
     }
 
     /// Some cell tests the layer's fields.
     pub(crate) const fn tested(&self) -> bool {
-        self.marks & TESTED != 0
+        self.marks() & TESTED != 0
+    }
+
+    #[inline(always)]
+    const fn marks(&self) -> u32 {
+        let [_, last] = self.bytes;
+        last >> MARKS
     }
 }
 
 /// What is known of a chain's label as its nodes are walked.
 struct Known<'k> {
     /// The key before, and the one before that with how far things move on from there (see [`Setting::before_that`]).
-    held: Option<(Line<'k>, &'k [u32])>,
-    older: Option<(Line<'k>, &'k [u32], i32)>,
+    held: (Line<'k>, &'k [u32]),
+    older: (Line<'k>, &'k [u32]),
+    ratio: i32,
     /// The row above, where its layers start, and the row above that.
     north: Line<'k>,
     start: usize,
     far_north: Line<'k>,
-    /// The layers north-west and north of the node.
-    behind: Option<usize>,
-    over: Option<usize>,
-    /// The positions one and two nodes to the west.
-    west: [Option<[i32; 2]>; 2],
     /// Where the label's plane is seen.
     plane: Option<Across>,
 }
 
-/// A layer of the same label at a neighbouring node.
+/// A layer of the same label at a neighbouring node; one that has left no trace is not there.
 #[derive(Clone, Copy)]
 struct Neighbour<'t> {
     uv: [i32; 2],
     trace: &'t Trace,
 }
 
-/// The neighbours that are already coded: west, north, north-east, north-west, and one further west and north.
-struct Neighbours<'t> {
-    near: [Option<Neighbour<'t>>; 4],
-    far_west: Option<[i32; 2]>,
-    far_north: Option<[i32; 2]>,
+impl Neighbour<'_> {
+    const NONE: Self = Self { uv: [0; 2], trace: &Trace { bytes: [0; 2], correction: [0; 2], offset: [0; 2] } };
+
+    #[inline(always)]
+    const fn there(&self) -> bool {
+        self.trace.marks() & THERE != 0
+    }
 }
 
-impl<'t> Neighbours<'t> {
-    fn all(&self) -> impl Iterator<Item = &Neighbour<'t>> {
-        self.near.iter().flatten()
-    }
-
-    /// Where a layer may be that no predictor has an answer for: the mean of its neighbours, or without any the middle of its chart.
-    #[inline(never)]
-    fn guess(&self, record: &LabelRecord, key_bits: u32) -> [i32; 2] {
-        let mut positions = Sum::default();
-        self.all().for_each(|n| positions.add(n.uv));
-        positions.mean().unwrap_or_else(|| {
-            let middle = |a: u16, b: u16| i32::from(a).wrapping_add(i32::from(b)).wrapping_shl(key_bits) >> 1;
-            [middle(record.left, record.right), middle(record.top, record.bottom)]
-        })
-    }
+/// The neighbours that are already coded, and one further west and north.
+struct Neighbours<'t> {
+    /// Where the one to the west is, and its trace.
+    west: ([i32; 2], Trace),
+    north: Neighbour<'t>,
+    /// To the north-east.
+    ahead: Neighbour<'t>,
+    /// To the north-west.
+    behind: Neighbour<'t>,
+    far_west: Option<[i32; 2]>,
+    far_north: Option<[i32; 2]>,
 }
 
 fn pair(uv: KeyUv) -> [i32; 2] {
     [uv.u(), uv.v()]
 }
 
+#[inline(always)]
+fn position(positions: &[u32], layer: usize) -> Option<[i32; 2]> {
+    positions.get(layer).map(|&uv| pair(KeyUv(uv)))
+}
+
 impl<'k> Known<'k> {
     fn new<L>(setting: &Setting<'k, '_, L>, line: impl Fn(usize) -> &'k [Chain], row: usize, chain: Chain) -> Self {
         let label = chain.label as u8;
         let above = row.checked_sub(1).map_or(&[][..], &line);
-        let mut north = Line::new(above, label);
-        let behind = chain.first.checked_sub(1).and_then(|column| north.layer(column));
-        let over = north.layer(chain.first);
+        let of =
+            |key: Option<&'k Key<'_>>| key.map_or((Line::new(&[], label), &[][..]), |key| (Line::new(key.chains(row), label), &*key.uv));
         let plane = setting.planes.binary_search_by_key(&label, |[label, ..]| *label).ok().and_then(|plane| setting.views.get(plane));
         Self {
-            held: setting.before.map(|key| (Line::new(key.chains(row), label), &*key.uv)),
-            older: setting.before_that.map(|(key, ratio)| (Line::new(key.chains(row), label), &*key.uv, ratio)),
-            north,
+            held: of(setting.before),
+            older: of(setting.before_that.map(|(key, _)| key)),
+            ratio: setting.before_that.map_or(0, |(_, ratio)| ratio),
+            north: Line::new(above, label),
             start: above.first().map_or(0, |first| first.at.into()),
             far_north: Line::new(row.checked_sub(2).map_or(&[][..], &line), label),
-            behind,
-            over,
-            west: [None; 2],
             plane: plane.map(|view| view.across(chain.first.into(), row)),
         }
     }
 
-    /// The neighbours of the node in `column`, given the key's `positions`, the traces of the row `above` and of the node to the `west`.
+    /// The layer north of the node in `column`, given the key's `positions` and the traces of the row `above`.
     #[inline(always)]
-    fn around<'t>(&mut self, positions: &[u32], above: &'t [Trace], west: Option<&'t Trace>, column: u16) -> Neighbours<'t> {
-        let ahead = self.north.layer(column.wrapping_add(1));
-        let position = |layer: usize| Some(pair(KeyUv(*positions.get(layer)?)));
-        let near = |layer: Option<usize>| {
-            let trace = above.get(layer?.wrapping_sub(self.start))?;
-            Some(Neighbour { uv: position(layer?)?, trace })
-        };
-        let [west_uv, far_west] = self.west;
-        let west = west_uv.zip(west).map(|(uv, trace)| Neighbour { uv, trace });
-        let near = [west, near(self.over), near(ahead), near(self.behind)];
-        let far_north = if self.over.is_some() { self.far_north.layer(column).and_then(position) } else { None };
-        (self.behind, self.over) = (self.over, ahead);
-        Neighbours { near, far_west, far_north }
+    fn over<'t>(&mut self, positions: &[u32], above: &'t [Trace], column: u16) -> Neighbour<'t> {
+        let Some(layer) = self.north.layer(column) else { return Neighbour::NONE };
+        let trace = above.get(layer.wrapping_sub(self.start));
+        trace.zip(position(positions, layer)).map_or(Neighbour::NONE, |(trace, uv)| Neighbour { uv, trace })
     }
 
-    /// On to the next node, from one whose layer is at `uv`.
+    /// The neighbours of the first node, in `column`.
+    #[inline(never)]
+    fn at<'t>(&mut self, positions: &[u32], above: &'t [Trace], column: u16) -> Neighbours<'t> {
+        let behind = column.checked_sub(1).map_or(Neighbour::NONE, |column| self.over(positions, above, column));
+        let north = self.over(positions, above, column);
+        Neighbours { west: ([0; 2], Trace::default()), north, ahead: Neighbour::NONE, behind, far_west: None, far_north: None }
+    }
+}
+
+/// Sums over a node's neighbours: two errors each, in halves of words; in the last two words' upper halves noise and marks.
+struct Sums([u32; 4]);
+
+impl Sums {
     #[inline(always)]
-    fn step(&mut self, uv: KeyUv) {
-        let [west, _] = self.west;
-        self.west = [Some(pair(uv)), west];
+    const fn noise(&self) -> u32 {
+        let [.., noise, _] = self.0;
+        noise >> 16
     }
 
-    /// What the predictors say of the node in `column`.
+    /// How many neighbours have such a `mark`.
     #[inline(always)]
-    fn candidates(&mut self, around: &Neighbours<'_>, column: u16) -> Candidates {
-        let at = |(line, uv): (&mut Line<'_>, &[u32])| Some(pair(KeyUv(*uv.get(line.layer(column)?)?)));
-        let held = self.held.as_mut().and_then(|(line, uv)| at((line, uv)));
-        let older = self.older.as_mut().and_then(|(line, uv, ratio)| Some((at((line, uv))?, *ratio)));
-        let flat = self.plane.as_mut().and_then(Across::advance);
-        Candidates::new(around, held, older, flat)
+    const fn count(&self, mark: u32) -> u32 {
+        let [.., marks] = self.0;
+        // Marks are counted without the noise below them, three bits each.
+        marks >> MARKS.wrapping_add(mark.trailing_zeros()).wrapping_sub(8) & 7
+    }
+
+    /// The class of how noisy the neighbours were.
+    #[inline(always)]
+    fn noise_class(&self) -> usize {
+        let (noise, count) = (self.noise(), self.count(THERE));
+        // Twice the mean noise is at least a limit where twice the noise is at least as many times the limit.
+        match count {
+            0 => NOISE_CLASSES - 1,
+            _ => [1, 2, 4, 8, 14, 26, 60].iter().take_while(|&&limit| noise.wrapping_mul(2) >= count.wrapping_mul(limit)).count(),
+        }
+    }
+}
+
+impl Neighbours<'_> {
+    #[inline(always)]
+    fn traces(&self) -> [&Trace; 4] {
+        [&self.west.1, self.north.trace, self.ahead.trace, self.behind.trace]
+    }
+
+    #[inline(always)]
+    fn sums(&self) -> Sums {
+        const HALVES: u32 = 0x00ff_00ff;
+        let mut sums = [0u32; 4];
+        for trace in self.traces() {
+            let ([a, b, c, d], [first, last]) = (sums, trace.bytes);
+            // The highest bit of noise's byte is another mark.
+            let noise = last & (HALVES ^ TESTED << MARKS);
+            sums = [
+                a.wrapping_add(first & HALVES),
+                b.wrapping_add(first >> 8 & HALVES),
+                c.wrapping_add(noise),
+                d.wrapping_add(last >> 8 & HALVES),
+            ];
+        }
+        Sums(sums)
+    }
+
+    /// Where a layer may be that no predictor has an answer for: the mean of its neighbours, or without any the middle of its chart.
+    #[inline(never)]
+    fn guess(&self, record: &LabelRecord, key_bits: u32) -> [i32; 2] {
+        let (west, trace) = &self.west;
+        let near = [Neighbour { uv: *west, trace }, self.north, self.ahead, self.behind];
+        let mut positions = Sum::default();
+        near.iter().filter(|neighbour| neighbour.there()).for_each(|neighbour| positions.add(neighbour.uv));
+        positions.mean().unwrap_or_else(|| {
+            let middle = |a: u16, b: u16| i32::from(a).wrapping_add(i32::from(b)).wrapping_shl(key_bits) >> 1;
+            [middle(record.left, record.right), middle(record.top, record.bottom)]
+        })
+    }
+
+    /// On to the next node, from one whose layer is at `uv` and has left `trace`.
+    #[inline(always)]
+    fn step(&mut self, uv: [i32; 2], trace: Trace) {
+        let (west, before) = self.west;
+        self.far_west = (before.marks() & THERE != 0).then_some(west);
+        self.west = (uv, trace);
+        (self.behind, self.north) = (self.north, self.ahead);
     }
 }
 
@@ -233,9 +297,11 @@ struct Candidates {
     uv: [[i32; 2]; PREDICTORS],
     /// Which of them there are, a bit each.
     known: u32,
-    temporal: Option<[i32; 2]>,
-    flat: Option<[i32; 2]>,
 }
+
+/// Places of two of them.
+const PLANE: usize = 0;
+const TIME: usize = 2;
 
 fn plus(a: [i32; 2], b: [i32; 2]) -> [i32; 2] {
     let ([a, b], [c, d]) = (a, b);
@@ -279,42 +345,36 @@ impl Sum {
 
 impl Candidates {
     #[inline(always)]
-    fn new(around: &Neighbours<'_>, held: Option<[i32; 2]>, older: Option<([i32; 2], i32)>, flat: Option<[i32; 2]>) -> Self {
-        let temporal = held.map(|held| match older {
-            // Positions differ by less than 2^16 and the ratio is at most 2^12: the product fits 2^28.
-            Some((older, ratio)) => plus(held, minus(held, older).map(|d| d.wrapping_mul(ratio) >> 8)),
-            None => held,
-        });
-        let [west, north, _, north_west] = &around.near;
-        let (mut corrections, mut offsets) = (Sum::default(), Sum::default());
-        for n in around.all() {
-            if n.trace.marks & TEMPORAL != 0 {
-                corrections.add(n.trace.correction.map(i32::from));
-            }
-            if n.trace.marks & FLAT != 0 {
-                offsets.add(n.trace.offset.map(i32::from));
-            }
-        }
-        let mut answers = Self { uv: [[0; 2]; PREDICTORS], known: 0, temporal, flat };
+    fn new(near: &Neighbours<'_>, sums: &Sums, known: &mut Known<'_>, column: u16) -> Self {
+        let mut answers = Self { uv: [[0; 2]; PREDICTORS], known: 0 };
         // Of equally good predictions the first is taken: what a plane tells is best where nothing else is known.
-        if let Some(flat) = flat {
-            answers.set::<0>(flat);
-            if let Some(offset) = offsets.mean() {
-                answers.set::<1>(plus(flat, offset));
+        if let Some(flat) = known.plane.as_mut().and_then(Across::advance) {
+            answers.set::<PLANE>(flat);
+            if let Some(offset) = near.mean(sums, FLAT, |trace| trace.offset) {
+                answers.set::<{ PLANE + 1 }>(plus(flat, offset));
             }
         }
-        if let Some(temporal) = temporal {
-            answers.set::<2>(temporal);
-            if let Some(correction) = corrections.mean() {
-                answers.set::<3>(plus(temporal, correction));
+        let at = |(line, uv): &mut (Line<'_>, &[u32])| position(uv, line.layer(column)?);
+        let (held, older) = (at(&mut known.held), at(&mut known.older));
+        if let Some(held) = held {
+            let temporal = match older {
+                // Positions differ by less than 2^16 and the ratio is at most 2^12: the product fits 2^28.
+                Some(older) => plus(held, minus(held, older).map(|d| d.wrapping_mul(known.ratio) >> 8)),
+                None => held,
+            };
+            answers.set::<TIME>(temporal);
+            if let Some(correction) = near.mean(sums, TEMPORAL, |trace| trace.correction) {
+                answers.set::<{ TIME + 1 }>(plus(temporal, correction));
             }
         }
-        if let (Some(w), Some(n), Some(nw)) = (west, north, north_west) {
-            answers.set::<4>(minus(plus(w.uv, n.uv), nw.uv));
+        let (west, trace) = &near.west;
+        let west = Neighbour { uv: *west, trace };
+        if west.there() && near.north.there() && near.behind.there() {
+            answers.set::<4>(minus(plus(west.uv, near.north.uv), near.behind.uv));
         }
         let mut lines = Sum::default();
-        for (near, far) in [(west, around.far_west), (north, around.far_north)] {
-            if let (Some(near), Some(far)) = (near, far) {
+        for (near, far) in [(west, near.far_west), (near.north, near.far_north)] {
+            if let Some(far) = far {
                 lines.add(minus(plus(near.uv, near.uv), far));
             }
         }
@@ -332,51 +392,60 @@ impl Candidates {
         }
     }
 
-    /// The candidate that was best at the neighbours, and the class of how noisy they were.
     #[inline(always)]
-    fn choose(&self, around: &Neighbours<'_>, record: &LabelRecord, key_bits: u32) -> ([i32; 2], usize) {
-        // Errors of up to four neighbours: sums of bytes two by two, in halves of words.
-        const HALVES: u32 = 0x00ff_00ff;
-        let (mut even, mut odd) = ([0u32; WORDS], [0u32; WORDS]);
-        let (mut noise, mut count) = (0u32, 0u32);
-        for n in around.all() {
-            for ((even, odd), error) in even.iter_mut().zip(&mut odd).zip(n.trace.error) {
-                *even = even.wrapping_add(error & HALVES);
-                *odd = odd.wrapping_add(error >> 8 & HALVES);
+    fn knows(&self, predictor: usize) -> bool {
+        self.known & 1u32.wrapping_shl(predictor as u32) != 0
+    }
+
+    /// The candidate that was best at the neighbours.
+    #[inline(always)]
+    fn best(&self, sums: &Sums) -> Option<[i32; 2]> {
+        let ([a, b, c, d, e, f], [first, second, third, fourth]) = (self.uv, sums.0);
+        let (mut least, mut best) = (u32::MAX, [0; 2]);
+        // One after the other, since a loop over six is not unrolled.
+        let mut compare = |predictor: usize, candidate: [i32; 2], error: u32| {
+            if self.knows(predictor) && error < least {
+                (least, best) = (error, candidate);
             }
-            (noise, count) = (noise.wrapping_add(n.trace.noise.into()), count.wrapping_add(1));
-        }
-        let sums = even.iter().zip(&odd).flat_map(|(even, odd)| [even & 0xffff, odd & 0xffff, even >> 16, odd >> 16]);
-        let mut best: Option<(u32, [i32; 2])> = None;
-        for (index, (candidate, error)) in self.uv.iter().zip(sums).enumerate() {
-            let known = self.known.wrapping_shr(index as u32) & 1 != 0;
-            if known && best.is_none_or(|(least, _)| error < least) {
-                best = Some((error, *candidate));
-            }
-        }
-        // Twice the mean noise is at least a limit where twice the noise is at least as many times the limit.
-        let class = match count {
-            0 => NOISE_CLASSES - 1,
-            _ => [1, 2, 4, 8, 14, 26, 60].iter().take_while(|&&limit| noise.wrapping_mul(2) >= count.wrapping_mul(limit)).count(),
         };
-        (best.map_or_else(|| around.guess(record, key_bits), |(_, uv)| uv), class)
+        compare(0, a, first & 0xffff);
+        compare(1, b, second & 0xffff);
+        compare(2, c, first >> 16);
+        compare(3, d, second >> 16);
+        compare(4, e, third & 0xffff);
+        compare(5, f, fourth & 0xffff);
+        (self.known != 0).then_some(best)
     }
 
     #[inline(always)]
-    fn trace(&self, uv: KeyUv, residual: [i32; 2], step_log2: u32, marks: u16) -> Trace {
-        let actual = pair(uv);
-        let size = |[a, b]: [i32; 2]| a.unsigned_abs().saturating_add(b.unsigned_abs());
-        let mut error = [0u32; WORDS];
-        for (index, candidate) in self.uv.iter().enumerate() {
-            let known = self.known.wrapping_shr(index as u32) & 1 != 0;
-            let off = if known { (size(minus(actual, *candidate)) >> step_log2).min(255) } else { SILENT };
-            if let Some(word) = error.get_mut(index >> 2) {
-                *word |= off.wrapping_shl((index as u32 & 3) << 3);
-            }
-        }
-        let from = |known: Option<[i32; 2]>| known.map_or([0, 0], |t| minus(actual, t)).map(|x| x.clamp(-32_768, 32_767) as i16);
-        let known = if self.temporal.is_some() { TEMPORAL } else { 0 } | if self.flat.is_some() { FLAT } else { 0 };
-        let noise = size(residual).min(255) as u16;
-        Trace { error, correction: from(self.temporal), offset: from(self.flat), noise, marks: marks | known }
+    fn trace(&self, uv: KeyUv, residual: [i32; 2], step_log2: u32, marks: u32) -> Trace {
+        let (actual, [a, b, c, d, e, f]) = (pair(uv), self.uv);
+        // Differences are below 2^29: sums of two fit. Signed, so that one instruction bounds them.
+        let size = |[a, b]: [i32; 2]| a.wrapping_abs().wrapping_add(b.wrapping_abs());
+        let off = |predictor: usize, candidate: [i32; 2]| {
+            let off = (size(minus(actual, candidate)) >> step_log2).clamp(0, 255) as u32;
+            (if self.knows(predictor) { off } else { SILENT }).wrapping_shl((predictor as u32 & 3) << 3)
+        };
+        let (first, last) = (off(0, a) | off(1, b) | off(2, c) | off(3, d), off(4, e) | off(5, f));
+        let short = |predictor: usize, candidate: [i32; 2]| {
+            let short = minus(actual, candidate).map(|x| x.clamp(-32_768, 32_767) as i16);
+            if self.knows(predictor) { short } else { [0; 2] }
+        };
+        let flat = if self.knows(PLANE) { FLAT } else { 0 };
+        let temporal = if self.knows(TIME) { TEMPORAL } else { 0 };
+        let marks = marks & TESTED | THERE | flat | temporal | size(residual).clamp(0, MOST_NOISE) as u32;
+        Trace { bytes: [first, last | marks << MARKS], correction: short(TIME, c), offset: short(PLANE, a) }
+    }
+}
+
+impl Neighbours<'_> {
+    /// The mean of what those neighbours' traces say that have such a `mark`; the others say nothing.
+    #[inline(always)]
+    fn mean(&self, sums: &Sums, mark: u32, of: impl Fn(&Trace) -> [i16; 2]) -> Option<[i32; 2]> {
+        let wide = |trace: &Trace| of(trace).map(i32::from);
+        let [west, north, ahead, behind] = self.traces();
+        let first = if west.marks() & mark != 0 { west } else { north };
+        let sum = plus(plus(wide(west), wide(north)), plus(wide(ahead), wide(behind)));
+        Sum { sum, first: wide(first), count: sums.count(mark) }.mean()
     }
 }
