@@ -185,11 +185,11 @@ impl Plan<'_> {
         let Some(slots) = slots.get_mut(..most.wrapping_mul(tiles)) else { return 0 };
         let window = Window { width_log2: WIDTH, ..Window::USUAL };
         let first = i32::from(run.row).wrapping_shl(16);
-        // Inside as far as the margin from either side: sums of both are below a power of two.
+        // Inside as far as the margin from either side: one comparison for both.
         let margin = self.margin;
-        let inside = |x: i32, y: i32, log2: u32| {
-            let [less, more] = [x, y].map(|x| (x.wrapping_sub(margin) | x.wrapping_add(margin)) as u32);
-            (less | more) >> log2.wrapping_add(16) == 0
+        let inside = |x: i32, log2: u32| {
+            let room = 1i32.wrapping_shl(log2.wrapping_add(16)).wrapping_sub(margin.wrapping_mul(2));
+            (x.wrapping_sub(margin) as u32) < room as u32
         };
         let mut ends = above.as_chunks::<EVERY>().0.iter().zip(below.as_chunks::<EVERY>().0).filter_map(|(b, d)| b.first().zip(d.first()));
         let Some((a, c)) = ends.next().map(|(a, c)| (a.uv(), c.uv())) else { return 0 };
@@ -199,7 +199,8 @@ impl Plan<'_> {
         for (slot, (b, d)) in slots.iter_mut().zip(ends) {
             let (b, d) = (b.uv(), d.uv());
             let (right_u, right_v) = (b.u, b.v.wrapping_sub(first));
-            if !(inside(b.u, d.u, window.width_log2) && inside(right_v, d.v.wrapping_sub(first), window.rows_log2)) {
+            let across = inside(b.u, window.width_log2) && inside(d.u, window.width_log2);
+            if !(across && inside(right_v, window.rows_log2) && inside(d.v.wrapping_sub(first), window.rows_log2)) {
                 break;
             }
             let (right_down_u, right_down_v) = (d.u.wrapping_sub(b.u), d.v.wrapping_sub(b.v));
