@@ -1,6 +1,7 @@
 //! The sheets of a row of cells at one moment: where each one's corners and middles are.
 //! Rows of nodes come from `row`, sheet lists from the caller's memory; spans go to `span`.
 
+use crate::coverage::Bounds;
 use crate::fixed::PlayUv;
 use crate::grid::Grid;
 use crate::lists::Lists;
@@ -156,6 +157,24 @@ impl Block<'_, '_> {
         };
         let ([a, b], [c, d]) = (edge(above), edge(below));
         [a, b, c, d].map(|layer| layer.uv())
+    }
+
+    /// What lies around the left edges of `sheet` in the block and in the one to the right of it, and around the right edge of that one; if cells are
+    /// not quartered, there is no other block: around the cell's edges.
+    #[must_use]
+    #[inline(always)]
+    pub fn verticals(&self, sheet: &Sheet) -> [Bounds; 3] {
+        let [top, halfway, bottom] = self.rows;
+        let [a, b, c] = sheet.nodes;
+        let (above, below) = match self.quarter {
+            None => (top.pair(a), bottom.pair(c)),
+            Some([_, false]) => (top.pair(a), halfway.pair(b)),
+            Some([_, true]) => (halfway.pair(b), bottom.pair(c)),
+        };
+        let ([a, b], [c, d]) = (above, below);
+        let [left, right] = [(a, c), (b, d)].map(|(above, below)| Bounds::of(above.at.uv(), below.at.uv()));
+        let middle = if self.quarter.is_some() { Bounds::of(a.middle.uv(), c.middle.uv()) } else { right };
+        [left, middle, right]
     }
 
     /// Field `which` of `sheet` at the cell's corners, Q16 pixels: straight from edge to edge of the cell, whatever space is.

@@ -178,42 +178,60 @@ fn field_rows<const LOG2: u32>(site: &Site<'_, '_, '_>, (strip, block): (u32, u3
 #[inline(never)]
 pub fn candidates(site: &Site<'_, '_, '_>, strip: u32, sheets: &[Sheet]) -> [u16; 2] {
     let (cubic, lower) = (site.cubic(), strip & 1 == 1);
-    let blocks = [0, 1].map(|right| site.block(right, strip));
-    let mut shown = [0u16; 2];
-    let mut open = [true, cubic];
-    let last = sheets.len().wrapping_sub(1);
-    for (place, sheet) in sheets.iter().enumerate().take(MAX_SHEETS) {
-        let bit = 1u16.wrapping_shl(place as u32);
-        let mut covers = [Cover::All; 2];
-        if place != last {
-            let chart = site.chart(sheet);
-            if sheet.test() != CHART {
-                let [first, ..] = &blocks;
-                covers = field_covers(first.field(sheet, 0), cubic, lower);
-                if chart.strip() {
-                    let [left, right] = field_covers(first.field(sheet, 1), cubic, lower);
-                    covers = [covers[0].and(left), covers[1].and(right)];
-                }
-            }
-            if sheet.test() != FIELD {
-                for ((cover, block), open) in covers.iter_mut().zip(&blocks).zip(open) {
-                    if open && *cover != Cover::Nothing {
-                        *cover = cover.and(chart.cover(&Bounds::around(&block.corners(sheet))));
-                    }
-                }
+    let block = site.block(0, strip);
+    let (mut left, mut right) = (Seen { sheets: 0, open: true }, Seen { sheets: 0, open: cubic });
+    let mut bit = 1u16;
+    let Some((_, before)) = sheets.split_last() else { return [0; 2] };
+    for sheet in before.iter().take(MAX_SHEETS - 1) {
+        let Some(chart) = site.charts.get(usize::from(sheet.label())) else { break };
+        let (mut on_left, mut on_right) = (Cover::All, Cover::All);
+        if sheet.test() != CHART {
+            [on_left, on_right] = field_covers(block.field(sheet, 0), cubic, lower);
+            if chart.strip() {
+                let [left, right] = field_covers(block.field(sheet, 1), cubic, lower);
+                (on_left, on_right) = (on_left.and(left), on_right.and(right));
             }
         }
-        for ((shown, cover), open) in shown.iter_mut().zip(covers).zip(&mut open) {
-            if *open && cover != Cover::Nothing {
-                *shown |= bit;
-                *open = cover != Cover::All;
+        let (asked, asked_right) = (left.open && on_left != Cover::Nothing, right.open && on_right != Cover::Nothing);
+        if sheet.test() != FIELD && (asked || asked_right) {
+            let [a, b, c] = block.verticals(sheet);
+            if asked {
+                on_left = on_left.and(chart.cover(&a.join(b)));
+            }
+            if asked_right {
+                on_right = on_right.and(chart.cover(&b.join(c)));
             }
         }
-        if open == [false; 2] {
+        left.see(bit, on_left);
+        right.see(bit, on_right);
+        if !left.open && !right.open {
             break;
         }
+        bit = bit.wrapping_shl(1);
     }
-    shown
+    // The last one covers what is left.
+    left.see(bit, Cover::All);
+    right.see(bit, Cover::All);
+    [left.sheets, right.sheets]
+}
+
+/// What is seen of a block, from front to back.
+struct Seen {
+    /// The sheets, a bit each.
+    sheets: u16,
+    /// Those behind them may show.
+    open: bool,
+}
+
+impl Seen {
+    /// The sheet of `bit` covers so much of it.
+    #[inline(always)]
+    fn see(&mut self, bit: u16, cover: Cover) {
+        if self.open && cover != Cover::Nothing {
+            self.sheets |= bit;
+            self.open = cover != Cover::All;
+        }
+    }
 }
 
 /// How much of a cell's blocks in one of its strips a field of `corners` at the cell's corners covers: of the left one and the right one where
