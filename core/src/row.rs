@@ -378,17 +378,16 @@ impl NodeRow<'_> {
     #[must_use]
     pub fn find(&self, label: u8, column: usize) -> Option<[u16; 2]> {
         let (column, label) = (column as u16, u16::from(label));
-        let head = *self.head.get(usize::from(label))?;
-        for chain in self.chain.get(usize::from(head)..self.chains)? {
-            if chain.label != label {
-                break;
-            }
+        let chains = self.chain.get(..self.chains)?;
+        let mut place = usize::from(*self.head.get(usize::from(label))?);
+        loop {
+            let chain = chains.get(place).filter(|chain| chain.label == label)?;
             if column.wrapping_add(1) < chain.end {
                 let along = column.checked_sub(chain.first)?;
                 return Some([chain.at.wrapping_add(along), chain.end.wrapping_sub(column).wrapping_sub(1)]);
             }
+            place = place.wrapping_add(1);
         }
-        None
     }
 
     /// The fields of layer `index` and of the next one of its chain; those of layers that show everywhere where the bundle has none.
