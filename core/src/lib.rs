@@ -120,7 +120,7 @@ mod span;
 mod texels;
 pub mod timeline;
 mod torn;
-mod window;
+pub mod window;
 mod work;
 
 pub use bundle::{Bundle, checksum};

@@ -6,6 +6,7 @@ use super::mask::Mask;
 use super::place::Place;
 use super::strip::{Shape, Spot, Strip};
 use crate::chart::Charting;
+use cubist_core::window::Window;
 use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::ops::Range;
@@ -21,6 +22,10 @@ const STEPS: i32 = 12;
 const STEP: f64 = 1.01;
 /// Ever longer steps back from what bisection finds, until what is seen but not drawn fits too.
 const BACK: i32 = 40;
+/// Texels that an image may be larger by for windows: without them the player draws pixel by pixel, which takes two to four times as long.
+const WINDOWED: u32 = 4096;
+/// Rows that an image may be given for that.
+const ROWS: [u32; 2] = [16, 64];
 /// Orders for searching a scale; all are tried at the scale found.
 const QUICK: usize = 3;
 /// Shuffled orders, fewer where there are many charts to lay down in each.
@@ -100,8 +105,11 @@ impl Items {
     fn smallest(&self, side: u32, most: u32, gutter: u32) -> Option<([u32; 2], Vec<Spot>)> {
         let best = self.smaller(0..QUICK, side, gutter, |_| most)?;
         // The others need not be laid down to the end where they come to no less.
-        let [width, height] = best.0;
-        let less = |wide: u32| ((width * height - 1) / wide / 4 * 4).min(most);
+        let texels = worth(best.0) - 1;
+        let less = |wide: u32| {
+            let texels = if windowed([wide, u32::MAX]) { texels } else { texels.saturating_sub(WINDOWED) };
+            (texels / wide / 4 * 4).min(most)
+        };
         self.smaller(QUICK..self.orders.len(), side, gutter, less).or(Some(best))
     }
 
@@ -112,11 +120,23 @@ impl Items {
         let of = |(i, &(width, order)): (usize, &(u32, usize))| {
             let (height, spots) = self.lay(order, [width, most(width)], gutter)?;
             let height = height.next_multiple_of(4);
-            Some((width * height, i, [width, height], spots))
+            let taller = ROWS.into_iter().filter(|&rows| rows > height && rows <= most(width));
+            let size = std::iter::once(height).chain(taller).map(|height| [width, height]).min_by_key(|&size| worth(size))?;
+            Some((worth(size), i, size, spots))
         };
-        let best = tries.par_iter().enumerate().filter_map(of).min_by_key(|&(texels, i, ..)| (texels, i));
+        let best = tries.par_iter().enumerate().filter_map(of).min_by_key(|&(worth, i, ..)| (worth, i));
         best.map(|(_, _, size, spots)| (size, spots))
     }
+}
+
+/// The player has windows in images of this size.
+fn windowed([width, height]: [u32; 2]) -> bool {
+    Window::new(width.ilog2(), height).is_some()
+}
+
+/// What an image of this size takes, texels, windows among them.
+fn worth([width, height]: [u32; 2]) -> u32 {
+    width * height + if windowed([width, height]) { 0 } else { WINDOWED }
 }
 
 /// Sizes of the charts in texels at a scale.
