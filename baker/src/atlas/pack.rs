@@ -110,7 +110,8 @@ impl Items {
             let texels = if windowed([wide, u32::MAX]) { texels } else { texels.saturating_sub(WINDOWED) };
             (texels / wide / 4 * 4).min(most)
         };
-        self.smaller(QUICK..self.orders.len(), side, gutter, less).or(Some(best))
+        let other = self.smaller(QUICK..self.orders.len(), side, gutter, less);
+        other.filter(|(size, _)| worth(*size) <= texels).or(Some(best))
     }
 
     /// The smallest image that some of the orders make, of at most `most` rows for its width.
