@@ -142,7 +142,7 @@ cases! {
     a_ring_on_a_mountain: 27.0, 1.8, 184.0;
     the_apex_of_a_cone: 28.5, 0.2, 7.0;
     a_rolling_silhouette: 30.5, 1.0, 17.0;
-    edge_on: 23.0, 1.1, 17.0;
+    edge_on: 22.5, 1.1, 17.0;
     the_horizon: 33.5, 0.2, 238.0;
     a_ball_from_all_to_nothing: 26.0, 0.6, 112.0;
     a_needle: 32.0, 0.3, 1.0;
