@@ -5,7 +5,7 @@ use crate::coverage::Bounds;
 use crate::sheet::Corners;
 
 /// A tile, in caller's memory: 2^[`TILE_LOG2`] pixels of a row, or a block's where that is smaller, and as many rows. All are positions in a
-/// window, or differences of such, as [`crate::span::Packed`] holds them.
+/// window, or differences of such, as `span::Packed` holds them.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Tile {
@@ -91,7 +91,7 @@ impl Window {
         Some(row).filter(|&row| self.holds(bounds, row, margin))
     }
 
-    /// A difference of u and v in Q16 texels, or a position with v from the window's first row on, as [`crate::span::Packed`] holds it,
+    /// A difference of u and v in Q16 texels, or a position with v from the window's first row on, as `span::Packed` holds it,
     /// divided by 2^`log2`, each to the nearest.
     #[inline(always)]
     pub const fn pack(self, u: i32, v: i32, log2: u32) -> u32 {
