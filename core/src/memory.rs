@@ -12,7 +12,7 @@ use crate::nodes::{self, Layout};
 use crate::pack::{self, Picture, Recent, Scratch};
 use crate::plan::{Plan, Run};
 use crate::record::Stream;
-use crate::row::{NodeRow, Point};
+use crate::row::{Layer, NodeRow};
 use crate::sheet::{RowSheets, Sheet, Stretch};
 use crate::torn::{Mixed, SIDES_LOG2, Side};
 use crate::window::{TILE_LOG2, Tile};
@@ -145,7 +145,7 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, space: &mut Workspace<'
     let mut node_row = |row: &mut NodeRow<'m>, cuts: usize, fields: bool| {
         row.chain = cutter.take::<Chain>(row_chains.saturating_mul(cuts).min(row_layers));
         row.head = cutter.take(bundle.label_count());
-        row.point = cutter.take::<Point>(row_layers);
+        row.layer = cutter.take::<Layer>(row_layers.saturating_mul(if cubic { 2 } else { 1 }));
         row.field = cutter.take::<[i16; 2]>(if fields { row_layers } else { 0 });
         row.cubic = cubic;
         row.plain = plain;

@@ -116,11 +116,11 @@ impl Plan<'_> {
                 && site.bundle.grid().log2 == 3
             {
                 let most = (width.saturating_sub(across.left) >> 3).min(cells.wrapping_sub(along).into());
-                let rest = lines.map(|line| line.get(usize::from(along).wrapping_mul(2)..).unwrap_or(&[]));
+                let rest = lines.map(|line| line.get(usize::from(along).wrapping_mul(across.blocks() as usize)..).unwrap_or(&[]));
                 let more = match (site.cubic(), usual == Window::USUAL) {
-                    (true, true) => self.extend::<9, 1, 2>(across.block, most as usize, sheet.label(), rest),
-                    (true, false) => self.extend::<8, 1, 2>(across.block, most as usize, sheet.label(), rest),
-                    (false, _) => self.extend::<9, 2, 3>(across.block, most as usize, sheet.label(), rest),
+                    (true, true) => self.extend::<9, 2, 2>(across.block, most as usize, sheet.label(), rest),
+                    (true, false) => self.extend::<8, 2, 2>(across.block, most as usize, sheet.label(), rest),
+                    (false, _) => self.extend::<9, 1, 3>(across.block, most as usize, sheet.label(), rest),
                 };
                 along = along.wrapping_add(more);
                 across.step(across.blocks().wrapping_mul(more.into()));
@@ -166,10 +166,9 @@ impl Plan<'_> {
     }
 
     /// Appends smooth cells, the first of which begins with tile `place`, to the last run, as long as they follow it and fit into its window, `most`
-    /// at most; returns how many. `above` and `below` start at their left corners: nodes, and halfway to the next. Tiles of 2^LOG2 pixels are between
-    /// every EVERY-th of these: two a cell, or one, where what is halfway is skipped.
+    /// at most; returns how many. `above` and `below` start at their left corners: between each two of these is a tile of 2^LOG2 pixels, TILES a cell.
     #[inline(never)]
-    fn extend<const WIDTH: u32, const EVERY: usize, const LOG2: u32>(
+    fn extend<const WIDTH: u32, const TILES: usize, const LOG2: u32>(
         &mut self,
         place: u32,
         most: usize,
@@ -181,8 +180,7 @@ impl Plan<'_> {
             return 0;
         }
         let Some(slots) = self.tile.get_mut(self.tiles..) else { return 0 };
-        let tiles = 3usize.wrapping_sub(EVERY);
-        let Some(slots) = slots.get_mut(..most.wrapping_mul(tiles)) else { return 0 };
+        let Some(slots) = slots.get_mut(..most.wrapping_mul(TILES)) else { return 0 };
         let window = Window { width_log2: WIDTH, ..Window::USUAL };
         let first = i32::from(run.row).wrapping_shl(16);
         // Inside as far as the margin from either side: one comparison for both.
@@ -191,13 +189,13 @@ impl Plan<'_> {
             let room = 1i32.wrapping_shl(log2.wrapping_add(16)).wrapping_sub(margin.wrapping_mul(2));
             (x.wrapping_sub(margin) as u32) < room as u32
         };
-        let mut ends = above.as_chunks::<EVERY>().0.iter().zip(below.as_chunks::<EVERY>().0).filter_map(|(b, d)| b.first().zip(d.first()));
-        let Some((a, c)) = ends.next().map(|(a, c)| (a.uv(), c.uv())) else { return 0 };
+        // `zip` alone would find both, and the slots, by an index, which costs registers.
+        let mut ends = above.iter().zip(below).map_while(|(above, below)| Some((above.uv(), below.uv())));
+        let Some((a, c)) = ends.next() else { return 0 };
         let (mut u, mut v) = (a.u, a.v.wrapping_sub(first));
         let (mut down_u, mut down_v) = (c.u.wrapping_sub(a.u), c.v.wrapping_sub(a.v));
         let mut done = 0usize;
         for (slot, (b, d)) in slots.iter_mut().zip(ends) {
-            let (b, d) = (b.uv(), d.uv());
             let (right_u, right_v) = (b.u, b.v.wrapping_sub(first));
             let across = inside(b.u, window.width_log2) && inside(d.u, window.width_log2);
             if !(across && inside(right_v, window.rows_log2) && inside(d.v.wrapping_sub(first), window.rows_log2)) {
@@ -214,8 +212,8 @@ impl Plan<'_> {
             done = done.wrapping_add(1);
         }
         // Half a cell is for `append`, which finds the same.
-        let cells = if tiles == 1 { done } else { done >> 1 };
-        let done = cells.wrapping_mul(tiles);
+        let cells = if TILES == 1 { done } else { done >> 1 };
+        let done = cells.wrapping_mul(TILES);
         run.count = run.count.wrapping_add(done as u16);
         self.tiles = self.tiles.wrapping_add(done);
         cells as u16

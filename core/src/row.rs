@@ -36,15 +36,8 @@ impl Layer {
     }
 }
 
-/// A layer of a row of nodes, in caller's memory.
-#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub struct Point {
-    /// The layer.
-    pub at: Layer,
-    /// Where space is cubic, what is halfway to the next one of its chain.
-    pub middle: Layer,
-}
+/// Where space is cubic, a layer and what is halfway to the next one of its chain.
+type Pair = [Layer; 2];
 
 /// The keys around a moment.
 #[derive(Clone, Copy, Debug)]
@@ -73,12 +66,13 @@ fn mix(from: i8, to: i8, linear: i32) -> i16 {
     (sum >> WEIGHT_BITS).clamp(-32_767, 32_767) as i16
 }
 
-/// Fills `slots` with what `four` keys' positions make with these `weights`.
+/// Fills every EVERY-th of `slots`, from the first on, with what `four` keys' positions make with these `weights`.
 #[inline(never)]
-fn blend_all(slots: &mut [Point], [a, b, c, d]: [&[u32]; 4], weights: Weights, key_bits: u32) {
+fn blend_all<const EVERY: usize>(slots: &mut [Layer], [a, b, c, d]: [&[u32]; 4], weights: Weights, key_bits: u32) {
+    let slots = slots.as_chunks_mut::<EVERY>().0.iter_mut().filter_map(|slots| slots.first_mut());
     let keys = a.iter().zip(b).zip(c.iter().zip(d));
-    for (slot, ((&a, &b), (&c, &d))) in slots.iter_mut().zip(keys) {
-        slot.at = blend([KeyUv(a), KeyUv(b), KeyUv(c), KeyUv(d)], weights, key_bits);
+    for (slot, ((&a, &b), (&c, &d))) in slots.zip(keys) {
+        *slot = blend([KeyUv(a), KeyUv(b), KeyUv(c), KeyUv(d)], weights, key_bits);
     }
 }
 
@@ -95,14 +89,6 @@ const fn blend(four: [KeyUv; 4], [a, b, c, d]: Weights, key_bits: u32) -> Layer 
     let v = start.wrapping_add(a.wrapping_mul((e.0 >> 16) as i32)).wrapping_add(b.wrapping_mul((f.0 >> 16) as i32));
     let v = v.wrapping_add(c.wrapping_mul((g.0 >> 16) as i32)).wrapping_add(d.wrapping_mul((h.0 >> 16) as i32));
     Layer { u: u.wrapping_shr(drop), v: v.wrapping_shr(drop) }
-}
-
-impl Chain {
-    /// The first layer of a row of nodes and those after it.
-    #[inline(always)]
-    fn of<'l>(&self, points: &'l [Point]) -> &'l [Point] {
-        points.get(usize::from(self.at)..).and_then(|points| points.get(..self.nodes().into())).unwrap_or(&[])
-    }
 }
 
 /// A row's chains, gone through by label and from left to right, beside those of another.
@@ -154,9 +140,9 @@ pub struct NodeRow<'m> {
     pub chains: usize,
     /// The first chain of every label; [`NONE`]: there is none. The others follow it, from left to right.
     pub head: &'m mut [u16],
-    /// Positions, Q15.16 texels, chain by chain.
-    pub point: &'m mut [Point],
-    /// Space is cubic: what is halfway between points is wanted.
+    /// Positions, Q15.16 texels, chain by chain; where space is cubic, each followed by what is halfway to the next one of its chain.
+    pub layer: &'m mut [Layer],
+    /// Space is cubic.
     pub cubic: bool,
     /// The backdrop is one position: nothing has to be worked out halfway.
     pub plain: bool,
@@ -174,7 +160,8 @@ impl NodeRow<'_> {
     #[inline(always)]
     fn open(&mut self, label: u16, first: u16, end: u16, at: usize) -> Option<Chain> {
         let chain = Chain { first, end, at: at as u16, field: NONE, label };
-        let room = at.wrapping_add(chain.nodes().into()) <= self.point.len().min(usize::from(NONE));
+        let held = self.layer.len().wrapping_shr(self.cubic.into());
+        let room = at.wrapping_add(chain.nodes().into()) <= held.min(usize::from(NONE));
         let slot = self.chain.get_mut(self.chains).filter(|_| room)?;
         let head = self.head.get_mut(usize::from(label))?;
         *slot = chain;
@@ -218,19 +205,18 @@ impl NodeRow<'_> {
     /// Fills in the layers of the backdrop's `chain`, which stands still.
     #[inline(never)]
     fn stand(&mut self, chain: Chain, record: &LabelRecord, grid: Grid, row: usize, key_bits: u32) {
-        let slots = self.point.get_mut(usize::from(chain.at)..).unwrap_or(&mut []);
-        let slots = slots.get_mut(..chain.nodes().into()).unwrap_or(&mut []);
+        let (plain, every) = (self.plain, if self.cubic { 2 } else { 1 });
+        let slots = self.of(&chain);
         let layer = |column: u16| {
             let PlayUv { u, v } = key::backdrop(record, [column, row as u16], grid.log2, key_bits);
             Layer { u, v }
         };
-        if self.plain {
-            let at = layer(0);
-            slots.fill(Point { at, middle: at });
+        if plain {
+            slots.fill(layer(0));
             return;
         }
-        for (slot, column) in slots.iter_mut().zip(chain.first..) {
-            slot.at = layer(column);
+        for (slot, column) in slots.iter_mut().step_by(every).zip(chain.first..) {
+            *slot = layer(column);
         }
     }
 
@@ -245,8 +231,8 @@ impl NodeRow<'_> {
         [before, after]: [&mut Beside<'k>; 2],
     ) {
         let [both, no_first, no_last, neither] = &moment.weights;
-        let slots = self.point.get_mut(usize::from(chain.at)..).unwrap_or(&mut []);
-        let mut slots = slots.get_mut(..chain.nodes().into()).unwrap_or(&mut []);
+        let cubic = self.cubic;
+        let mut slots = self.of(&chain);
         let layers = |key: &Key<'_>, of: &Chain| usize::from(of.at.wrapping_add(chain.first.wrapping_sub(of.first))).min(key.uv.len());
         let mut from = keys.from.uv.get(layers(keys.from, start)..).unwrap_or(&[]);
         let mut to = keys.to.uv.get(layers(keys.to, end)..).unwrap_or(&[]);
@@ -255,15 +241,20 @@ impl NodeRow<'_> {
             let (first, high) = before.part(keys.before.map_or(&[], |key| &*key.uv), chain.label, column);
             let (last, low) = after.part(keys.after.map_or(&[], |key| &*key.uv), chain.label, column);
             let stop = chain.end.min(high).min(low);
-            let nodes = usize::from(stop.wrapping_sub(column)).min(slots.len());
+            let nodes = usize::from(stop.wrapping_sub(column)).min(slots.len().wrapping_shr(cubic.into()));
             let weights = match (first, last) {
                 (Some(_), Some(_)) => both,
                 (None, Some(_)) => no_first,
                 (Some(_), None) => no_last,
                 (None, None) => neither,
             };
-            let (some, others) = slots.split_at_mut(nodes);
-            blend_all(some, [first.unwrap_or(from), from, to, last.unwrap_or(to)], *weights, keys.key_bits);
+            let (some, others) = slots.split_at_mut(nodes.wrapping_shl(cubic.into()).min(slots.len()));
+            let four = [first.unwrap_or(from), from, to, last.unwrap_or(to)];
+            if cubic {
+                blend_all::<2>(some, four, *weights, keys.key_bits);
+            } else {
+                blend_all::<1>(some, four, *weights, keys.key_bits);
+            }
             (slots, column) = (others, stop);
             (from, to) = (from.get(nodes..).unwrap_or(&[]), to.get(nodes..).unwrap_or(&[]));
             // A chain of no nodes, which only a broken bundle has, ends the row.
@@ -297,23 +288,23 @@ impl NodeRow<'_> {
     }
 
     /// Fills the row with what lies halfway between rows `from` and `to`, where both carry it; `before` and `after` are the rows
-    /// around these. Returns how many layers there are.
+    /// around these. Space is cubic. Returns how many layers there are.
     #[inline(never)]
     pub fn between(&mut self, rows: [&NodeRow<'_>; 4]) -> u32 {
         self.clear();
         let [mut above, from, mut lower, mut below] = rows.map(NodeRow::chains);
-        let [before, upper, bottom, after] = rows.map(|row| &*row.point);
+        let [before, upper, bottom, after] = rows.map(NodeRow::pairs);
+        let plain = self.plain;
         let mut count = 0usize;
         for start in from.chains {
             let mut column = start.first;
             while let Some(end) = lower.from(start.label, column).filter(|end| end.first < start.end) {
                 let (first, stop) = (column.max(end.first), start.end.min(end.end));
                 let Some(chain) = self.open(start.label, first, stop, count) else { return count as u32 };
-                let slots = self.point.get_mut(count..).unwrap_or(&mut []);
-                let mut slots = slots.get_mut(..chain.nodes().into()).unwrap_or(&mut []);
+                let mut slots = self.of(&chain).as_chunks_mut::<2>().0;
                 count = count.wrapping_add(slots.len());
                 column = first;
-                if self.plain && chain.label == BACKDROP {
+                if plain && chain.label == BACKDROP {
                     slots.fill(upper.get(usize::from(start.at)).copied().unwrap_or_default());
                     slots = &mut [];
                 }
@@ -354,7 +345,7 @@ impl NodeRow<'_> {
         if !self.cubic {
             return;
         }
-        let mut points = &mut *self.point;
+        let mut points = self.layer.as_chunks_mut::<2>().0;
         for chain in self.chain.get(..self.chains).unwrap_or(&[]) {
             let Some((mine, rest)) = points.split_at_mut_checked(chain.nodes().into()) else { break };
             points = rest;
@@ -366,11 +357,11 @@ impl NodeRow<'_> {
             let (Some(mut last), Some(mut here)) = (mine.next(), mine.next()) else { continue };
             let mut before = None;
             for next in mine {
-                last.middle = Layer::middle(before, last.at, here.at, Some(next.at));
-                before = Some(last.at);
+                last[1] = Layer::middle(before, last[0], here[0], Some(next[0]));
+                before = Some(last[0]);
                 (last, here) = (here, next);
             }
-            last.middle = Layer::middle(before, last.at, here.at, None);
+            last[1] = Layer::middle(before, last[0], here[0], None);
         }
     }
 
@@ -397,42 +388,70 @@ impl NodeRow<'_> {
         self.field.get(usize::from(index)..).and_then(<[_]>::first_chunk).copied().unwrap_or([[1, 1]; 2])
     }
 
-    /// Layer `index` and the next one of its chain.
+    /// Layer `index` and the next one of its chain, where space is linear.
     #[must_use]
     #[inline(always)]
-    pub fn pair(&self, index: u16) -> &[Point; 2] {
-        const NONE: &[Point; 2] = &[Point { at: Layer { u: 0, v: 0 }, middle: Layer { u: 0, v: 0 } }; 2];
-        self.point.get(usize::from(index)..).and_then(<[_]>::first_chunk).unwrap_or(NONE)
+    pub fn ends(&self, index: u16) -> &[Layer; 2] {
+        const NONE: &[Layer; 2] = &[Layer { u: 0, v: 0 }; 2];
+        self.layer.get(usize::from(index)..).and_then(<[_]>::first_chunk).unwrap_or(NONE)
+    }
+
+    /// Layer `index`, what is halfway to the next one of its chain, and that one, where space is cubic.
+    #[must_use]
+    #[inline(always)]
+    pub fn thirds(&self, index: u16) -> &[Layer; 3] {
+        const NONE: &[Layer; 3] = &[Layer { u: 0, v: 0 }; 3];
+        self.layer.get(usize::from(index).wrapping_mul(2)..).and_then(<[_]>::first_chunk).unwrap_or(NONE)
+    }
+
+    /// Layer `index` and all that come after it, as they stand.
+    #[must_use]
+    pub fn from(&self, index: u16) -> &[Layer] {
+        self.layer.get(usize::from(index).wrapping_shl(self.cubic.into())..).unwrap_or(&[])
+    }
+
+    /// The slots of `chain`.
+    #[inline(always)]
+    fn of(&mut self, chain: &Chain) -> &mut [Layer] {
+        let log2 = u32::from(self.cubic);
+        let slots = self.layer.get_mut(usize::from(chain.at).wrapping_shl(log2)..).unwrap_or(&mut []);
+        slots.get_mut(..usize::from(chain.nodes()).wrapping_shl(log2)).unwrap_or(&mut [])
+    }
+
+    /// Where space is cubic, each layer and what is halfway to the next one.
+    fn pairs(&self) -> &[Pair] {
+        self.layer.as_chunks().0
     }
 }
 
 /// The layers of `chain` from node `column` on, which it has.
-fn cut<'l>(chain: &Chain, points: &'l [Point], column: u16) -> &'l [Point] {
-    chain.of(points).get(usize::from(column.wrapping_sub(chain.first))..).unwrap_or(&[])
+fn cut<'l>(chain: &Chain, points: &'l [Pair], column: u16) -> &'l [Pair] {
+    let all = points.get(usize::from(chain.at)..).and_then(|points| points.get(..chain.nodes().into())).unwrap_or(&[]);
+    all.get(usize::from(column.wrapping_sub(chain.first))..).unwrap_or(&[])
 }
 
 /// Fills `slots` with what lies halfway between `from` and `to`; `before` and `after` are what comes before and after, where there is such.
-fn middles(slots: &mut [Point], from: &[Point], to: &[Point], before: Option<&[Point]>, after: Option<&[Point]>) {
+fn middles(slots: &mut [Pair], from: &[Pair], to: &[Pair], before: Option<&[Pair]>, after: Option<&[Pair]>) {
     let inner = slots.iter_mut().zip(from.iter().zip(to));
     match (before, after) {
         (Some(before), Some(after)) => {
             for ((slot, (from, to)), (before, after)) in inner.zip(before.iter().zip(after)) {
-                slot.at = Layer::middle(Some(before.at), from.at, to.at, Some(after.at));
+                slot[0] = Layer::middle(Some(before[0]), from[0], to[0], Some(after[0]));
             }
         }
         (Some(before), None) => {
             for ((slot, (from, to)), before) in inner.zip(before) {
-                slot.at = Layer::middle(Some(before.at), from.at, to.at, None);
+                slot[0] = Layer::middle(Some(before[0]), from[0], to[0], None);
             }
         }
         (None, Some(after)) => {
             for ((slot, (from, to)), after) in inner.zip(after) {
-                slot.at = Layer::middle(None, from.at, to.at, Some(after.at));
+                slot[0] = Layer::middle(None, from[0], to[0], Some(after[0]));
             }
         }
         (None, None) => {
             for (slot, (from, to)) in inner {
-                slot.at = Layer::middle(None, from.at, to.at, None);
+                slot[0] = Layer::middle(None, from[0], to[0], None);
             }
         }
     }

@@ -5,7 +5,7 @@ use crate::coverage::Bounds;
 use crate::fixed::PlayUv;
 use crate::grid::Grid;
 use crate::lists::Lists;
-use crate::row::NodeRow;
+use crate::row::{Layer, NodeRow};
 
 /// One sheet of a cell, in caller's memory: its label, its test, and where its layer at the cell's left edge stands in the rows
 /// above, halfway down and below; that at the right edge is the next. Halfway there is only where space is cubic.
@@ -146,14 +146,13 @@ impl Block<'_, '_> {
         let [top, halfway, bottom] = self.rows;
         let [a, b, c] = sheet.nodes;
         let Some([right, lower]) = self.quarter else {
-            let edge = |row: &NodeRow<'_>, left: u16| row.pair(left).map(|point| point.at.uv());
-            let ([a, b], [c, d]) = (edge(top, a), edge(bottom, c));
-            return [a, b, c, d];
+            let ([a, b], [c, d]) = (top.ends(a), bottom.ends(c));
+            return [a, b, c, d].map(|layer| layer.uv());
         };
         let (above, below) = if lower { ((halfway, b), (bottom, c)) } else { ((top, a), (halfway, b)) };
         let edge = |(row, left): (&NodeRow<'_>, u16)| {
-            let [from, to] = row.pair(left);
-            if right { [from.middle, to.at] } else { [from.at, from.middle] }
+            let &[from, middle, to] = row.thirds(left);
+            if right { [middle, to] } else { [from, middle] }
         };
         let ([a, b], [c, d]) = (edge(above), edge(below));
         [a, b, c, d].map(|layer| layer.uv())
@@ -166,15 +165,18 @@ impl Block<'_, '_> {
     pub fn verticals(&self, sheet: &Sheet) -> [Bounds; 3] {
         let [top, halfway, bottom] = self.rows;
         let [a, b, c] = sheet.nodes;
+        let around = |(above, below): (&Layer, &Layer)| Bounds::of(above.uv(), below.uv());
         let (above, below) = match self.quarter {
-            None => (top.pair(a), bottom.pair(c)),
-            Some([_, false]) => (top.pair(a), halfway.pair(b)),
-            Some([_, true]) => (halfway.pair(b), bottom.pair(c)),
+            None => {
+                let ([a, b], [c, d]) = (top.ends(a), bottom.ends(c));
+                let right = around((b, d));
+                return [around((a, c)), right, right];
+            }
+            Some([_, false]) => (top.thirds(a), halfway.thirds(b)),
+            Some([_, true]) => (halfway.thirds(b), bottom.thirds(c)),
         };
-        let ([a, b], [c, d]) = (above, below);
-        let [left, right] = [(a, c), (b, d)].map(|(above, below)| Bounds::of(above.at.uv(), below.at.uv()));
-        let middle = if self.quarter.is_some() { Bounds::of(a.middle.uv(), c.middle.uv()) } else { right };
-        [left, middle, right]
+        let ([a, b, c], [d, e, f]) = (above, below);
+        [(a, d), (b, e), (c, f)].map(around)
     }
 
     /// Field `which` of `sheet` at the cell's corners, Q16 pixels: straight from edge to edge of the cell, whatever space is.

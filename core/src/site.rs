@@ -55,7 +55,7 @@ impl Site<'_, '_, '_> {
         self.log2().min(TILE_LOG2)
     }
 
-    /// What is above and below strip `strip`, from the left corners of `sheet` on: nodes, and halfway to the next.
+    /// What is above and below strip `strip`, from the left corners of `sheet` on: nodes, and halfway to the next where space is cubic.
     #[must_use]
     pub fn lines(&self, strip: u32, sheet: &Sheet) -> [&[Layer]; 2] {
         let ([top, halfway, bottom], [a, b, c]) = (self.rows, sheet.nodes());
@@ -64,7 +64,7 @@ impl Site<'_, '_, '_> {
             (true, 0) => [(top, a), (halfway, b)],
             (true, _) => [(halfway, b), (bottom, c)],
         };
-        lines.map(|(row, from)| row.point.get(usize::from(from)..).and_then(|points| bytemuck::try_cast_slice(points).ok()).unwrap_or(&[]))
+        lines.map(|(row, from)| row.from(from))
     }
 
     /// Cells are quartered: space is cubic.
