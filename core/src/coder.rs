@@ -124,9 +124,11 @@ impl Bits for Decoder<'_> {
 
 /// Contexts of one signed number: is it zero, its sign, its magnitude class in unary, the bit after the leading one.
 pub const NUMBER_CONTEXTS: usize = 2 + 2 * CLASSES;
-/// Magnitude classes: 17 bits of magnitude at most. The last needs no flag that it is, and the first has no bit after the leading one: two contexts of a
-/// number are never used.
-const CLASSES: usize = 17;
+/// Magnitude classes with contexts of their own; larger ones, which are rare, share the last one's. The first has no bit after the leading one: one
+/// context of a number is never used.
+const CLASSES: usize = 10;
+/// Bits of a magnitude, at most.
+const MOST_BITS: u32 = 17;
 
 /// Codes a signed number of at most 17 bits of magnitude in `contexts` ([`NUMBER_CONTEXTS`] of them): zero flag, sign, the
 /// magnitude's bit length in unary, then the bits after the leading one, the first of them adaptive.
@@ -137,20 +139,22 @@ pub fn number<B: Bits>(bits: &mut B, contexts: &mut [Probability], value: i32) -
         return 0;
     }
     let negative = bits.bit(sign, value < 0);
-    let magnitude = value.unsigned_abs().clamp(1, (1 << CLASSES) - 1);
+    let magnitude = value.unsigned_abs().clamp(1, (1 << MOST_BITS) - 1);
     let (unary, next) = rest.split_at_mut(CLASSES);
+    let own = |class: u32| (class as usize).min(CLASSES - 1);
     let wanted = magnitude.ilog2();
     let mut class = 0u32;
-    for context in unary.iter_mut().take(CLASSES - 1) {
-        if !bits.bit(context, class < wanted) {
-            break;
-        }
+    // The last class needs no flag that it is.
+    while class < MOST_BITS - 1
+        && let Some(context) = unary.get_mut(own(class))
+        && bits.bit(context, class < wanted)
+    {
         class = class.wrapping_add(1);
     }
     let mut decoded = 1u32;
     if class > 0 {
         let below = class.wrapping_sub(1);
-        let first = next.get_mut(class as usize).map_or(0, |context| u32::from(bits.bit(context, magnitude >> below & 1 == 1)));
+        let first = next.get_mut(own(class)).map_or(0, |context| u32::from(bits.bit(context, magnitude >> below & 1 == 1)));
         let tail = bits.flat(below, magnitude & (1u32 << below).wrapping_sub(1));
         decoded = (2 | first) << below | tail;
     }
