@@ -86,14 +86,23 @@ impl Chart {
         if across && down && !self.masked() { Cover::All } else { Cover::Part }
     }
 
-    /// Those of the rectangle's edges that what lies between the corners of a block, within `bounds`, may cross.
-    #[must_use]
-    #[inline]
-    pub fn edges(&self, corners: &[PlayUv; 4], &Bounds { low, high }: &Bounds) -> [Option<Edge>; 4] {
+    /// Passes those of the rectangle's edges on that what lies between the corners of a block, within `bounds`, may cross.
+    #[inline(always)]
+    pub fn crossed(&self, corners: &[PlayUv; 4], &Bounds { low, high }: &Bounds, mut pass: impl FnMut(Edge)) {
         let (across, down) = (corners.map(|uv| uv.u), corners.map(|uv| uv.v));
-        let lower = |corners: [i32; 4], low: i32, at: i32| (low < at.wrapping_add(SLACK)).then_some(Edge { corners, at, upper: false });
-        let upper = |corners: [i32; 4], high: i32, at: i32| (high >= at.wrapping_sub(SLACK)).then_some(Edge { corners, at, upper: true });
-        [lower(across, low.u, self.left), upper(across, high.u, self.right), lower(down, low.v, self.top), upper(down, high.v, self.bottom)]
+        // One after the other: a list of them would be written to memory.
+        if low.u < self.left.wrapping_add(SLACK) {
+            pass(Edge::new(across, self.left, false));
+        }
+        if high.u >= self.right.wrapping_sub(SLACK) {
+            pass(Edge::new(across, self.right, true));
+        }
+        if low.v < self.top.wrapping_add(SLACK) {
+            pass(Edge::new(down, self.top, false));
+        }
+        if high.v >= self.bottom.wrapping_sub(SLACK) {
+            pass(Edge::new(down, self.bottom, true));
+        }
     }
 }
 
@@ -132,15 +141,21 @@ impl Bounds {
     }
 }
 
-/// An edge of a chart's rectangle, and one coordinate of a block's corners beside it.
+/// An edge of a chart's rectangle beside a block.
 #[derive(Clone, Copy, Debug)]
 pub struct Edge {
-    /// The coordinate above left and right, below left and right, Q16 texels.
-    pub corners: [i32; 4],
-    /// Where the edge is.
-    pub at: i32,
-    /// The chart is below it; else from it on.
+    /// How far beyond it the block's corners are, above left and right, below left and right, Q16 texels.
+    pub beyond: [i32; 4],
+    /// The chart is on the near side; else on the far one.
     pub upper: bool,
+}
+
+impl Edge {
+    /// The edge at `at` beside such `corners`.
+    #[inline(always)]
+    fn new(corners: [i32; 4], at: i32, upper: bool) -> Self {
+        Self { beyond: corners.map(|corner| corner.wrapping_sub(at)), upper }
+    }
 }
 
 /// Rounding moves positions by less than this, Q16 texels.

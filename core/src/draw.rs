@@ -34,8 +34,8 @@ pub trait Paint {
         log2: u32,
     );
 
-    /// What row `row` of a mixed block shows of one of its sides, in such a window.
-    fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, row: u32, out: &mut [Self::Pixel]);
+    /// What row `row` of a mixed block shows of one of its sides, in such a window: the pixels that `shown` names, a bit each.
+    fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, row: u32, shown: u32, out: &mut [Self::Pixel]);
 }
 
 /// Where pixels come from.
@@ -62,9 +62,10 @@ impl Paint for Probes {
         span::any_run(tiles, row, out, log2, [0; 2], |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(run.row) });
     }
 
-    fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, row: u32, out: &mut [Probe]) {
+    #[inline(always)]
+    fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, row: u32, shown: u32, out: &mut [Probe]) {
         let label = side.label as u8;
-        span::part(&side.tile, row, side.shown.row(row), out, [0; 2], |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(side.row) });
+        span::part(&side.tile, row, shown, out, [0; 2], |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(side.row) });
     }
 }
 
@@ -136,18 +137,34 @@ impl<'d, 'a> Drawing<'d, 'a> {
     fn mix<P: Paint, const WIDTH: u32, const ROWS: u32>(&self, y: u32, out: &mut [P::Pixel], paint: &P) {
         let log2 = self.site.log2();
         let row = y & (1u32 << log2).wrapping_sub(1);
-        for side in self.plan.side.get(..self.plan.sides).unwrap_or(&[]) {
-            if side.shown.row(row) != 0
-                && let Some(pixels) = pixels(side.block, out, log2)
-            {
-                paint.side::<WIDTH, ROWS>(side, row, pixels);
-            }
+        // No others have sides.
+        if log2 == 2 {
+            self.sides::<P, WIDTH, ROWS, 4>(row, out, paint);
+        } else {
+            self.sides::<P, WIDTH, ROWS, 8>(row, out, paint);
         }
         // Most often there is none.
         if self.plan.plain > 0 {
             for mixed in self.mixed().iter().filter(|mixed| mixed.sides == 0) {
                 let Some(pixels) = pixels(mixed.block, out, log2) else { break };
                 block(&self.site, *mixed, y, pixels, paint, None);
+            }
+        }
+    }
+
+    /// Draws row `row` of the mixed blocks that have sides, of `PIXELS` pixels each.
+    #[inline(always)]
+    fn sides<P: Paint, const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(&self, row: u32, out: &mut [P::Pixel], paint: &P) {
+        let (blocks, rest) = out.as_chunks_mut::<PIXELS>();
+        for side in self.plan.side.get(..self.plan.sides).unwrap_or(&[]) {
+            let shown = side.shown.row(row);
+            if shown == 0 {
+                continue;
+            }
+            // Said twice: of a known size, a loop over pixels is none.
+            match blocks.get_mut(usize::from(side.block)) {
+                Some(pixels) => paint.side::<WIDTH, ROWS>(side, row, shown, pixels),
+                None => paint.side::<WIDTH, ROWS>(side, row, shown, rest),
             }
         }
     }

@@ -13,7 +13,7 @@ use crate::pack::{self, Picture, Recent, Scratch};
 use crate::plan::{Plan, Run};
 use crate::record::Stream;
 use crate::row::{Layer, NodeRow};
-use crate::sheet::{RowSheets, Sheet, Stretch};
+use crate::sheet::{Found, RowSheets, Sheet, Stretch};
 use crate::torn::{Mixed, SIDES_LOG2, Side};
 use crate::window::{TILE_LOG2, Tile};
 use bytemuck::Pod;
@@ -158,7 +158,9 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, space: &mut Workspace<'
     if cubic {
         node_row(&mut space.halfway, 4, false);
     }
-    (space.sheets.stretch, space.sheets.sheet) = (cutter.take::<Stretch>(grid.columns), cutter.take::<Sheet>(limits.row_sheets.into()));
+    let sheets = &mut space.sheets;
+    (sheets.stretch, sheets.sheet) = (cutter.take::<Stretch>(grid.columns), cutter.take::<Sheet>(limits.row_sheets.into()));
+    sheets.found = cutter.take::<Found>(bundle.label_count());
     let plan = &mut space.plan;
     (plan.tile, plan.run, plan.mixed) = (cutter.take::<Tile>(tiles), cutter.take::<Run>(tiles), cutter.take::<Mixed>(blocks));
     // A sheet shows in every block of its cell at most.

@@ -66,17 +66,33 @@ pub struct RowSheets<'m> {
     pub stretches: usize,
     /// Front to back.
     pub sheet: &'m mut [Sheet],
+    /// Where each label's layers were found last.
+    pub found: &'m mut [Found],
+}
+
+/// Where the layers of a label stand, in neighbouring cells, in caller's memory.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Found {
+    /// The first of these cells,
+    column: u16,
+    /// and the one after the last.
+    end: u16,
+    /// In the first: see [`Sheet`].
+    nodes: [u16; 3],
 }
 
 /// The rows of nodes that bound a row of cells: above, halfway down, below. Where space is linear, the middle one is not looked at.
 pub type Rows<'r, 'm> = [&'r NodeRow<'m>; 3];
 
-/// The sheet of `label` in the cell in `column`, and in how many cells from there on it has corners.
-fn look_up([top, halfway, bottom]: Rows<'_, '_>, cubic: bool, label: u8, test: u8, column: usize) -> Option<(Sheet, u16)> {
+/// Where the layers of `label` stand in the cell in `column`, and in all those after it that have the same chains.
+#[inline(never)]
+fn look_up([top, halfway, bottom]: Rows<'_, '_>, cubic: bool, label: u8, column: usize) -> Option<Found> {
     let ([above, high], [below, low]) = (top.find(label, column)?, bottom.find(label, column)?);
     // Halfway down there is a layer wherever there is one above and below.
     let [between, _] = if cubic { halfway.find(label, column)? } else { [0; 2] };
-    Some((Sheet { nodes: [above, between, below], label, test }, high.min(low)))
+    let column = column as u16;
+    Some(Found { column, end: column.wrapping_add(high.min(low)), nodes: [above, between, below] })
 }
 
 impl RowSheets<'_> {
@@ -88,6 +104,7 @@ impl RowSheets<'_> {
         let mut count = 0usize;
         let mut column = 0usize;
         self.stretches = 0;
+        self.found.fill(Found::default());
         for stretch in self.stretch.iter_mut() {
             let Some(left) = grid.columns.checked_sub(column).filter(|&left| left > 0) else { break };
             let listed = lists.sheets(cursor);
@@ -95,10 +112,14 @@ impl RowSheets<'_> {
             let mut cells = 1usize;
             cursor = cursor.next(lists);
             for (index, &label) in listed.labels.iter().enumerate() {
-                let test = listed.test(index) as u8;
-                let found = look_up(rows, cubic, label, test, column);
-                let Some(((sheet, most), slot)) = found.zip(self.sheet.get_mut(count)) else { continue };
-                *slot = sheet;
+                // Columns ascend: what was found for one to the left holds up to where one of its chains ends.
+                let Some((known, slot)) = self.found.get_mut(usize::from(label)).zip(self.sheet.get_mut(count)) else { continue };
+                if column >= usize::from(known.end) {
+                    let Some(found) = look_up(rows, cubic, label, column) else { continue };
+                    *known = found;
+                }
+                let (along, most) = ((column as u16).wrapping_sub(known.column), known.end.wrapping_sub(column as u16));
+                *slot = Sheet { nodes: known.nodes, label, test: listed.test(index) as u8 }.further(along);
                 count = count.wrapping_add(1);
                 if listed.labels.len() == 1 {
                     let more = usize::from(most).min(left).saturating_sub(1);

@@ -2,7 +2,7 @@
 //! block by block where several sheets take turns. What is where comes from `plan`; pixels go to the caller's row.
 
 use crate::atlas::Texture;
-use crate::coverage::{Bounds, Chart, Cover, Edge};
+use crate::coverage::{Bounds, Chart, Cover};
 use crate::fixed::PlayUv;
 use crate::sheet::Corners;
 use crate::window::{TILE_LOG2, Tile};
@@ -241,19 +241,13 @@ fn negative(mut value: i32, step: i32, pixels: usize) -> u32 {
     below
 }
 
-impl Edge {
-    /// Which pixels of row `row` of a block of 2^`log2`, four at least, lie on its inner side: a bit each, at positions as [`Span::new`] has them.
-    #[inline(always)]
-    #[must_use]
-    pub fn row(&self, row: u32, log2: u32) -> u32 {
-        let (from, step) = along(self.corners, row, log2);
-        let inside = if self.upper {
-            negative(from.wrapping_sub(self.at), step, 1 << log2)
-        } else {
-            !negative(from.wrapping_sub(self.at), step, 1 << log2)
-        };
-        inside & 1u32.wrapping_shl(1 << log2).wrapping_sub(1)
-    }
+/// Which pixels of row `row` of a block of 2^`log2`, four at least, lie on the near side of an edge that its corners are so far `beyond`: a bit each, at
+/// positions as [`Span::new`] has them.
+#[inline(always)]
+#[must_use]
+pub fn near(beyond: [i32; 4], row: u32, log2: u32) -> u32 {
+    let (from, step) = along(beyond, row, log2);
+    negative(from, step, 1 << log2)
 }
 
 /// Those of the pixels that `shown` names, of a span of `pixels`, whose texels the mask has.
@@ -291,7 +285,7 @@ pub fn inside(chart: &Chart, mut shown: u32, pixels: usize, span: Span, texture:
 
 #[cfg(test)]
 mod tests {
-    use super::{Span, inside};
+    use super::{Span, inside, near};
     use crate::atlas::Texture;
     use crate::coverage::{Bounds, Chart};
     use crate::fixed::PlayUv;
@@ -310,12 +304,15 @@ mod tests {
         for round in 0..20_000u32 {
             let reach = if round % 2 == 0 { 1 << 17 } else { 1 << 20 };
             let corners = [(); 4].map(|()| PlayUv { u: (20 << 16) + next(reach) - next(reach), v: (31 << 16) + next(reach) - next(reach) });
-            let edges = chart.edges(&corners, &Bounds::around(&corners));
             for log2 in [2, 3] {
                 let pixels = 1usize << log2;
                 for row in 0..pixels as u32 {
                     let all = u32::MAX >> (32 - pixels);
-                    let told = edges.iter().flatten().fold(all, |shown, edge| shown & edge.row(row, log2));
+                    let mut told = all;
+                    chart.crossed(&corners, &Bounds::around(&corners), |edge| {
+                        let near = near(edge.beyond, row, log2);
+                        told &= if edge.upper { near } else { !near };
+                    });
                     let exact = inside(&chart, all, pixels, Span::new(corners, row, log2), &texture);
                     assert_eq!(told, exact, "{corners:?}, row {row}");
                     (some, none) = (some + u32::from(exact != 0), none + u32::from(exact == 0));

@@ -191,9 +191,9 @@ impl<C: Colours, F: Filter> Paint for Lookup<C, F> {
     }
 
     #[inline(always)]
-    fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, row: u32, out: &mut [u16]) {
+    fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, row: u32, shown: u32, out: &mut [u16]) {
         let from = usize::from(side.row).wrapping_shl(WIDTH);
-        span::part(&side.tile, row, side.shown.row(row), out, self.filter.offsets(WIDTH), |at: Packed<WIDTH, ROWS>| {
+        span::part(&side.tile, row, shown, out, self.filter.offsets(WIDTH), |at: Packed<WIDTH, ROWS>| {
             self.filter.packed(at, |index| self.colours.colour(from.wrapping_add(index)))
         });
     }

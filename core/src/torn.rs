@@ -133,9 +133,11 @@ impl Mixed {
                     }
                 }
                 if sheet.test() != FIELD {
-                    for edge in chart.edges(&corners, &bounds).into_iter().flatten() {
-                        shown = shown.and(if log2 == 2 { edge_rows::<2>(&edge) } else { edge_rows::<3>(&edge) });
-                    }
+                    chart.crossed(&corners, &bounds, |Edge { beyond: [a, b, c, d], upper }| {
+                        let near = if log2 == 2 { near_rows::<2>(a, b, c, d) } else { near_rows::<3>(a, b, c, d) };
+                        let near = Shown(near.into());
+                        shown = if upper { shown.and(near) } else { shown.and_not(near) };
+                    });
                     if chart.masked() && shown != Shown::NONE {
                         let covered = |row: u32| span::covered(shown.row(row), 1 << log2, Span::new(corners, row, log2), &site.texture);
                         shown = Shown::rows(log2, covered);
@@ -157,10 +159,12 @@ impl Mixed {
     }
 }
 
-/// Which pixels of a block lie on the inner side of `edge`.
+/// Which pixels of a block lie on the near side of an edge that its corners are so far beyond, as [`Shown`] has them.
+// Numbers alone go in and out in registers.
 #[inline(never)]
-fn edge_rows<const LOG2: u32>(edge: &Edge) -> Shown {
-    Shown::rows(LOG2, |row| edge.row(row, LOG2))
+fn near_rows<const LOG2: u32>(a: i32, b: i32, c: i32, d: i32) -> (u32, u32) {
+    let Shown([upper, lower]) = Shown::rows(LOG2, |row| span::near([a, b, c, d], row, LOG2));
+    (upper, lower)
 }
 
 /// At which pixels of block `block` of strip `strip` a field is positive, given what it is at the cell's corners.
