@@ -12,7 +12,7 @@ use crate::row::Layer;
 use crate::sheet::{Block, Corners, Sheet, Stretch};
 use crate::site::Site;
 use crate::torn::{self, Mixed, Side};
-use crate::window::{self, Tile, Window};
+use crate::window::{self, Room, Tile, Window};
 
 /// Neighbouring tiles that show one sheet of one label, in caller's memory.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
@@ -58,8 +58,6 @@ pub struct Plan<'m> {
     pub strip: Option<u32>,
     /// How far around a position pixels are told from, Q16 texels.
     pub reach: i32,
-    /// How far from the edges of windows positions are for that.
-    pub margin: i32,
     /// Mixed blocks are not asked for their sides.
     pub sideless: bool,
     /// Pixels of a row in cells of one sheet.
@@ -78,13 +76,12 @@ impl Plan<'_> {
         (self.tiles, self.runs, self.mixes, self.sides, self.plain) = (0, 0, 0, 0, 0);
         (self.smooth, self.torn, self.tests) = (0, 0, 0);
         (self.strip, self.reach, self.sideless) = (Some(strip), reach, sideless);
-        self.margin = window::margin(site.tile_log2()).wrapping_add(reach);
         let texture = site.bundle.texture();
-        let window = Window::new(texture.width_log2, texture.height);
+        let room = Room::new(texture.width_log2, texture.height, window::margin(site.tile_log2()).wrapping_add(reach));
         let (log2, width) = (site.log2(), site.bundle.size().0);
         let parts_log2 = log2.wrapping_sub(site.tile_log2());
         let (strip, part) = (strip.wrapping_shr(parts_log2), strip & 1u32.wrapping_shl(parts_log2).wrapping_sub(1));
-        let mut across = Across { site, window, strip, part, parts_log2, log2, width, left: 0, block: 0 };
+        let mut across = Across { site, room, strip, part, parts_log2, log2, width, left: 0, block: 0 };
         for &stretch in site.sheets.stretches() {
             match site.sheets.of(stretch) {
                 [sheet] => self.smooth(&mut across, stretch, sheet),
@@ -102,7 +99,7 @@ impl Plan<'_> {
 
     /// Plans so many `cells` that show `sheet` in this strip, and nothing else of what they have; `mixed` names it for the first of them.
     fn cells(&mut self, across: &mut Across<'_, '_, '_>, mixed: Mixed, sheet: &Sheet, cells: u16) {
-        let Across { site, window, strip, width, .. } = *across;
+        let Across { site, room, strip, width, .. } = *across;
         let lines = site.lines(strip, sheet);
         let mut along = 0u16;
         if site.plain(sheet) {
@@ -112,15 +109,16 @@ impl Plan<'_> {
         }
         while along < cells && across.left < width {
             // In pictures 512 wide, as most are, and cells of eight pixels; others go by `append` alone. Likewise the cell that the screen's edge cuts.
-            if let Some(usual) = window.filter(|&window| window == Window::USUAL || window == Window::NARROW && site.cubic())
+            if let Some(Room { window: usual, margin, .. }) = room
+                && (usual == Window::USUAL || usual == Window::NARROW && site.cubic())
                 && site.bundle.grid().log2 == 3
             {
                 let most = (width.saturating_sub(across.left) >> 3).min(cells.wrapping_sub(along).into());
                 let rest = lines.map(|line| line.get(usize::from(along).wrapping_mul(across.blocks() as usize)..).unwrap_or(&[]));
                 let more = match (site.cubic(), usual == Window::USUAL) {
-                    (true, true) => self.extend::<9, 2, 2>(across.block, most as usize, sheet.label(), rest),
-                    (true, false) => self.extend::<8, 2, 2>(across.block, most as usize, sheet.label(), rest),
-                    (false, _) => self.extend::<9, 1, 3>(across.block, most as usize, sheet.label(), rest),
+                    (true, true) => self.extend::<9, 2, 2>(across.block, most as usize, (sheet.label(), margin), rest),
+                    (true, false) => self.extend::<8, 2, 2>(across.block, most as usize, (sheet.label(), margin), rest),
+                    (false, _) => self.extend::<9, 1, 3>(across.block, most as usize, (sheet.label(), margin), rest),
                 };
                 along = along.wrapping_add(more);
                 across.step(across.blocks().wrapping_mul(more.into()));
@@ -172,7 +170,7 @@ impl Plan<'_> {
         &mut self,
         place: u32,
         most: usize,
-        label: u8,
+        (label, margin): (u8, i32),
         [above, below]: [&[Layer]; 2],
     ) -> u16 {
         let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return 0 };
@@ -184,7 +182,6 @@ impl Plan<'_> {
         let window = Window { width_log2: WIDTH, ..Window::USUAL };
         let first = i32::from(run.row).wrapping_shl(16);
         // Inside as far as the margin from either side: one comparison for both.
-        let margin = self.margin;
         let inside = |x: i32, log2: u32| {
             let room = 1i32.wrapping_shl(log2.wrapping_add(16)).wrapping_sub(margin.wrapping_mul(2));
             (x.wrapping_sub(margin) as u32) < room as u32
@@ -222,8 +219,8 @@ impl Plan<'_> {
     /// Adds a block that no run has, with its sides where it has such.
     fn mix(&mut self, across: &Across<'_, '_, '_>, mixed: Mixed) {
         let free = self.side.get_mut(self.sides..).unwrap_or(&mut []);
-        let window = across.window.filter(|_| !self.sideless);
-        let sides = window.and_then(|window| mixed.share(across.site, across.strip, window, self.margin, free)).unwrap_or(0);
+        let room = across.room.as_ref().filter(|_| !self.sideless);
+        let sides = room.and_then(|room| mixed.share(across.site, across.strip, room, free)).unwrap_or(0);
         if let Some(slot) = self.mixed.get_mut(self.mixes) {
             *slot = Mixed { sides: sides as u16, ..mixed };
             (self.mixes, self.sides) = (self.mixes.wrapping_add(1), self.sides.wrapping_add(sides));
@@ -238,11 +235,11 @@ impl Plan<'_> {
         if across.site.plain(sheet) {
             return self.plain(across, 1);
         }
-        let Some(window) = across.window else { return false };
+        let Some(room) = &across.room else { return false };
         let label = u16::from(sheet.label());
         let log2 = across.parts_log2;
         if log2 == 0 {
-            return self.tile(across, window, label, across.block as u16, [a, b, c, d]);
+            return self.tile(across, room, label, across.block as u16, [a, b, c, d]);
         }
         // The row of the block's tiles, then one after the other.
         let between = |from: PlayUv, to: PlayUv, part: u32| {
@@ -256,7 +253,7 @@ impl Plan<'_> {
         (0..1u32.wrapping_shl(log2)).all(|part| {
             let corners =
                 [between(a, b, part), between(a, b, part.wrapping_add(1)), between(c, d, part), between(c, d, part.wrapping_add(1))];
-            self.tile(across, window, label, across.block.wrapping_shl(log2).wrapping_add(part) as u16, corners)
+            self.tile(across, room, label, across.block.wrapping_shl(log2).wrapping_add(part) as u16, corners)
         })
     }
 
@@ -277,7 +274,7 @@ impl Plan<'_> {
     }
 
     /// Appends the tile at `place` to the last run, or begins another; false where its positions fit no window.
-    fn tile(&mut self, across: &Across<'_, '_, '_>, window: Window, label: u16, place: u16, corners: Corners) -> bool {
+    fn tile(&mut self, across: &Across<'_, '_, '_>, room: &Room, label: u16, place: u16, corners: Corners) -> bool {
         let log2 = across.log2.wrapping_sub(across.parts_log2);
         let Some(slot) = self.tile.get_mut(self.tiles) else { return false };
         let bounds = Bounds::around(&corners);
@@ -285,20 +282,20 @@ impl Plan<'_> {
         if let Some(run) = self.run.get_mut(last)
             && run.label == label
             && run.place.wrapping_add(run.count) == place
-            && window.holds(&bounds, run.row, self.margin)
+            && room.holds(&bounds, run.row)
         {
-            *slot = window.tile(corners, run.row, log2);
+            *slot = room.window.tile(corners, run.row, log2);
             run.count = run.count.wrapping_add(1);
             self.tiles = self.tiles.wrapping_add(1);
             return true;
         }
         // The window begins or ends at the tile, so that it has room where the run is heading.
-        let ([a, b, c, d], height) = (corners, across.site.texture.height);
+        let [a, b, c, d] = corners;
         let onwards = b.v.wrapping_add(d.v) >= a.v.wrapping_add(c.v);
-        let row = if onwards { window.row(&bounds, height, self.margin) } else { window.row_to(&bounds, height, self.margin) };
+        let row = if onwards { room.row(&bounds) } else { room.row_to(&bounds) };
         let Some(row) = row else { return false };
         let Some(run) = self.run.get_mut(self.runs) else { return false };
-        *slot = window.tile(corners, row, log2);
+        *slot = room.window.tile(corners, row, log2);
         *run = Run { place, count: 1, tile: self.tiles as u16, row, label };
         (self.tiles, self.runs) = (self.tiles.wrapping_add(1), self.runs.wrapping_add(1));
         true
@@ -309,7 +306,7 @@ impl Plan<'_> {
 #[derive(Clone, Copy, Debug)]
 struct Across<'s, 'a, 'm> {
     site: &'s Site<'s, 'a, 'm>,
-    window: Option<Window>,
+    room: Option<Room>,
     strip: u32,
     /// The row of tiles in the strip, and how many the strip has: 2^`parts_log2`.
     part: u32,

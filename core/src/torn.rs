@@ -7,7 +7,7 @@ use crate::lists::{CHART, FIELD};
 use crate::sheet::{Corners, Sheet};
 use crate::site::Site;
 use crate::span::{self, Field, Span};
-use crate::window::{Tile, Window};
+use crate::window::{Room, Tile};
 
 /// A block that shows several sheets, or whose positions fit no window, in caller's memory.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
@@ -104,10 +104,10 @@ impl Shown {
 pub const SIDES_LOG2: u32 = 3;
 
 impl Mixed {
-    /// Works out the block's sides in strip `strip`, for positions as far as `margin` from the edges of windows; how many of the `slots` they take.
+    /// Works out the block's sides in strip `strip`, for positions that `room` has; how many of the `slots` they take.
     /// `None` where positions fit no window, there is no room, or blocks of such a size have no sides. The frontmost sheet that covers a pixel shows.
     #[inline(never)]
-    pub fn share(&self, site: &Site<'_, '_, '_>, strip: u32, window: Window, margin: i32, slots: &mut [Side]) -> Option<usize> {
+    pub fn share(&self, site: &Site<'_, '_, '_>, strip: u32, room: &Room, slots: &mut [Side]) -> Option<usize> {
         let log2 = site.log2();
         if log2 != 2 && log2 != SIDES_LOG2 {
             return None;
@@ -148,11 +148,10 @@ impl Mixed {
                 }
             }
             left = left.and_not(shown);
-            let height = site.texture.height;
             // What does not show may lie anywhere.
-            let row = window.row(&bounds, height, margin).or_else(|| window.row(&shown.bounds(corners, log2), height, margin))?;
+            let row = room.row(&bounds).or_else(|| room.row(&shown.bounds(corners, log2)))?;
             *slots.get_mut(sides)? =
-                Side { tile: window.tile(corners, row, log2), shown, block: self.block, row, label: sheet.label().into() };
+                Side { tile: room.window.tile(corners, row, log2), shown, block: self.block, row, label: sheet.label().into() };
             sides = sides.wrapping_add(1);
         }
         Some(sides)

@@ -57,40 +57,6 @@ impl Window {
         if known && height >= 1 << rows_log2 { Some(Self { width_log2, rows_log2 }) } else { None }
     }
 
-    /// Whether what lies within `bounds` is inside the window from `row` on, and the picture, as far as `margin` from the edges of either.
-    #[must_use]
-    #[inline(always)]
-    pub const fn holds(self, &Bounds { low, high }: &Bounds, row: u16, margin: i32) -> bool {
-        let first = (row as i32).wrapping_shl(16);
-        let (right, end) = (1i32.wrapping_shl(self.width_log2.wrapping_add(16)), 1i32.wrapping_shl(self.rows_log2.wrapping_add(16)));
-        low.u >= margin
-            && high.u < right.wrapping_sub(margin)
-            && low.v >= first.wrapping_add(margin)
-            && high.v < first.wrapping_add(end).wrapping_sub(margin)
-    }
-
-    /// The first row of a window, in a picture `height` high, that holds what lies within `bounds` and begins there; `None` where there is no such.
-    #[must_use]
-    #[inline(always)]
-    pub fn row(self, bounds: &Bounds, height: u32, margin: i32) -> Option<u16> {
-        self.held(bounds, bounds.low.v.wrapping_sub(margin) >> 16, height, margin)
-    }
-
-    /// Likewise of one that ends where they do.
-    #[must_use]
-    #[inline(always)]
-    pub fn row_to(self, bounds: &Bounds, height: u32, margin: i32) -> Option<u16> {
-        let end = (bounds.high.v.wrapping_add(margin) >> 16).wrapping_add(1);
-        self.held(bounds, end.wrapping_sub(1i32.wrapping_shl(self.rows_log2)), height, margin)
-    }
-
-    /// The row of the picture that comes closest to `row`, if the window from there on holds what lies within `bounds`.
-    #[inline(always)]
-    fn held(self, bounds: &Bounds, row: i32, height: u32, margin: i32) -> Option<u16> {
-        let row = row.min(height.wrapping_sub(1u32.wrapping_shl(self.rows_log2)) as i32).max(0) as u16;
-        Some(row).filter(|&row| self.holds(bounds, row, margin))
-    }
-
     /// A difference of u and v in Q16 texels, or a position with v from the window's first row on, as `span::Packed` holds it,
     /// divided by 2^`log2`, each to the nearest.
     #[inline(always)]
@@ -129,6 +95,66 @@ impl Window {
             down: self.pack(c.u.wrapping_sub(a.u), c.v.wrapping_sub(a.v), log2),
             turn: self.pack(below_u.wrapping_sub(above_u), below_v.wrapping_sub(above_v), log2.wrapping_mul(2)),
         }
+    }
+}
+
+/// Where positions of a window may lie: inside it and the picture, as far as some margin from the edges of either. Q16 texels.
+#[derive(Clone, Copy, Debug)]
+pub struct Room {
+    /// The window.
+    pub window: Window,
+    /// The margin: the least u, and the least v from the window's first row on.
+    pub margin: i32,
+    /// What u is below.
+    right: i32,
+    /// What v is below, from the window's first row on.
+    end: i32,
+    /// The last window's first row, in the picture.
+    last: i32,
+}
+
+impl Room {
+    /// That of windows in a picture 2^`width_log2` texels wide and `height` high; `None` where it has none.
+    #[must_use]
+    pub const fn new(width_log2: u32, height: u32, margin: i32) -> Option<Self> {
+        let Some(window) = Window::new(width_log2, height) else { return None };
+        let right = 1i32.wrapping_shl(window.width_log2.wrapping_add(16)).wrapping_sub(margin);
+        let end = 1i32.wrapping_shl(window.rows_log2.wrapping_add(16)).wrapping_sub(margin);
+        let last = height.wrapping_sub(1u32.wrapping_shl(window.rows_log2)) as i32;
+        Some(Self { window, margin, right, end, last })
+    }
+
+    /// Whether it has what lies within `bounds`, in the window from `row` on.
+    #[must_use]
+    #[inline(always)]
+    pub const fn holds(&self, &Bounds { low, high }: &Bounds, row: u16) -> bool {
+        let first = (row as i32).wrapping_shl(16);
+        low.u >= self.margin
+            && high.u < self.right
+            && low.v.wrapping_sub(first) >= self.margin
+            && high.v.wrapping_sub(first) < self.end
+    }
+
+    /// The first row of a window that holds what lies within `bounds` and begins there; `None` where there is no such.
+    #[must_use]
+    #[inline(always)]
+    pub fn row(&self, bounds: &Bounds) -> Option<u16> {
+        self.held(bounds, bounds.low.v.wrapping_sub(self.margin) >> 16)
+    }
+
+    /// Likewise of one that ends where they do.
+    #[must_use]
+    #[inline(always)]
+    pub fn row_to(&self, bounds: &Bounds) -> Option<u16> {
+        let end = (bounds.high.v.wrapping_add(self.margin) >> 16).wrapping_add(1);
+        self.held(bounds, end.wrapping_sub(1i32.wrapping_shl(self.window.rows_log2)))
+    }
+
+    /// The row of the picture that comes closest to `row`, if the window from there on holds what lies within `bounds`.
+    #[inline(always)]
+    fn held(&self, bounds: &Bounds, row: i32) -> Option<u16> {
+        let row = row.min(self.last).max(0) as u16;
+        Some(row).filter(|&row| self.holds(bounds, row))
     }
 }
 
