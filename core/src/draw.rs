@@ -21,6 +21,9 @@ pub trait Paint {
     /// How far around a position pixels are told from, Q16 texels.
     const REACH: i32;
 
+    /// Its code is so short that loops over a few pixels are written out.
+    const SHORT: bool;
+
     /// The pixel at `uv`, which is inside the picture; `x`: whether it is an odd one of its row.
     fn at(&self, uv: PlayUv, label: u8, x: usize) -> Self::Pixel;
 
@@ -45,6 +48,7 @@ pub struct Probes;
 impl Paint for Probes {
     type Pixel = Probe;
     const REACH: i32 = 0;
+    const SHORT: bool = false;
 
     fn at(&self, uv: PlayUv, label: u8, _: usize) -> Probe {
         Probe { label, at: uv }
@@ -137,11 +141,10 @@ impl<'d, 'a> Drawing<'d, 'a> {
     fn mix<P: Paint, const WIDTH: u32, const ROWS: u32>(&self, y: u32, out: &mut [P::Pixel], paint: &P) {
         let log2 = self.site.log2();
         let row = y & (1u32 << log2).wrapping_sub(1);
-        // No others have sides.
-        if log2 == 2 {
-            self.sides::<P, WIDTH, ROWS, 4>(row, out, paint);
-        } else {
-            self.sides::<P, WIDTH, ROWS, 8>(row, out, paint);
+        match log2 {
+            2 if P::SHORT => self.sides::<P, WIDTH, ROWS, 4>(row, out, paint),
+            3 if P::SHORT => self.sides::<P, WIDTH, ROWS, 8>(row, out, paint),
+            _ => self.any_sides::<P, WIDTH, ROWS>(row, out, paint),
         }
         // Most often there is none.
         if self.plan.plain > 0 {
@@ -165,6 +168,19 @@ impl<'d, 'a> Drawing<'d, 'a> {
             match blocks.get_mut(usize::from(side.block)) {
                 Some(pixels) => paint.side::<WIDTH, ROWS>(side, row, shown, pixels),
                 None => paint.side::<WIDTH, ROWS>(side, row, shown, rest),
+            }
+        }
+    }
+
+    /// Likewise, of however many pixels a block has.
+    #[inline(always)]
+    fn any_sides<P: Paint, const WIDTH: u32, const ROWS: u32>(&self, row: u32, out: &mut [P::Pixel], paint: &P) {
+        for side in self.plan.side.get(..self.plan.sides).unwrap_or(&[]) {
+            let shown = side.shown.row(row);
+            if shown != 0
+                && let Some(pixels) = pixels(side.block, out, self.site.log2())
+            {
+                paint.side::<WIDTH, ROWS>(side, row, shown, pixels);
             }
         }
     }
@@ -211,7 +227,7 @@ fn pixels<T>(block: u16, row: &mut [T], log2: u32) -> Option<&mut [T]> {
 }
 
 /// Row `row` of a run's pixels by the width of the picture: those that `window` knows.
-#[inline(never)]
+#[inline(always)]
 fn by_width<P: Paint>(paint: &P, run: Run, tiles: &[Tile], row: u32, out: &mut [P::Pixel], log2: u32, width_log2: u32) {
     match width_log2 {
         8 => paint.run::<8, 6, 0x4000>(run, tiles, row, out, log2),

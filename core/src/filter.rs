@@ -9,6 +9,8 @@ use crate::span::Packed;
 pub trait Filter: Copy {
     /// How far it reaches beyond a position, Q16 texels.
     const REACH: i32;
+    /// Its code is so short that loops over a few pixels are written out.
+    const SHORT: bool;
 
     /// What is added to positions packed into windows 2^`width_log2` texels wide before [`Filter::packed`] gets them, at even and at odd pixels of a
     /// row.
@@ -27,6 +29,7 @@ pub struct Nearest;
 
 impl Filter for Nearest {
     const REACH: i32 = 0;
+    const SHORT: bool = true;
 
     #[inline(always)]
     fn offsets(self, _: u32) -> [u32; 2] {
@@ -68,6 +71,7 @@ impl Dither {
 
 impl Filter for Dither {
     const REACH: i32 = 3 << (PLAY_BITS - 3);
+    const SHORT: bool = true;
 
     #[inline(always)]
     fn offsets(self, width_log2: u32) -> [u32; 2] {
@@ -118,6 +122,7 @@ impl<const SWAPPED: bool> Bilinear<SWAPPED> {
 
 impl<const SWAPPED: bool> Filter for Bilinear<SWAPPED> {
     const REACH: i32 = 1 << (PLAY_BITS - 1);
+    const SHORT: bool = false;
 
     #[inline(always)]
     fn offsets(self, width_log2: u32) -> [u32; 2] {

@@ -152,6 +152,9 @@ pub struct AnyTexels;
 
 /// What makes colours of texels.
 trait Colours {
+    /// Its code is so short that loops over a few pixels are written out.
+    const SHORT: bool;
+
     /// The source image.
     fn texture(&self) -> &Texture<'_>;
 
@@ -179,6 +182,7 @@ struct Lookup<C, F> {
 impl<C: Colours, F: Filter> Paint for Lookup<C, F> {
     type Pixel = u16;
     const REACH: i32 = F::REACH;
+    const SHORT: bool = F::SHORT && C::SHORT;
 
     #[inline(always)]
     fn at(&self, uv: PlayUv, _: u8, x: usize) -> u16 {
@@ -214,6 +218,8 @@ impl Colours8<'_> {
 }
 
 impl Colours for Colours8<'_> {
+    const SHORT: bool = true;
+
     fn texture(&self) -> &Texture<'_> {
         &self.texture
     }
@@ -316,6 +322,8 @@ impl Colours4<'_> {
 }
 
 impl Colours for Colours4<'_> {
+    const SHORT: bool = true;
+
     fn texture(&self) -> &Texture<'_> {
         &self.texture
     }
@@ -375,6 +383,8 @@ fn pixel<const SWAPPED: bool>(texel: Option<&[u8; 2]>) -> u16 {
 }
 
 impl Colours for ColoursDirect<'_> {
+    const SHORT: bool = true;
+
     fn texture(&self) -> &Texture<'_> {
         &self.texture
     }
@@ -436,6 +446,8 @@ pub enum AnyColours<'t> {
 }
 
 impl Colours for AnyColours<'_> {
+    const SHORT: bool = false;
+
     fn texture(&self) -> &Texture<'_> {
         match self {
             Self::Eight(colours) => colours.texture(),

@@ -129,10 +129,7 @@ impl Room {
     #[inline(always)]
     pub const fn holds(&self, &Bounds { low, high }: &Bounds, row: u16) -> bool {
         let first = (row as i32).wrapping_shl(16);
-        low.u >= self.margin
-            && high.u < self.right
-            && low.v.wrapping_sub(first) >= self.margin
-            && high.v.wrapping_sub(first) < self.end
+        low.u >= self.margin && high.u < self.right && low.v.wrapping_sub(first) >= self.margin && high.v.wrapping_sub(first) < self.end
     }
 
     /// The first row of a window that holds what lies within `bounds` and begins there; `None` where there is no such.
