@@ -86,6 +86,27 @@ impl Chart {
         if across && down && !self.masked() { Cover::All } else { Cover::Part }
     }
 
+    /// How much the chart covers of a block whose left and right edges end at these positions: what [`Chart::cover`] says of what lies around them.
+    // Without the bounds: one position mostly tells that not all are beyond an edge.
+    #[must_use]
+    #[inline(always)]
+    pub fn cover_block(&self, [[a, b], [c, d]]: [[PlayUv; 2]; 2]) -> Cover {
+        let (left, right) = (self.left.wrapping_sub(SLACK), self.right.wrapping_add(SLACK));
+        let (top, bottom) = (self.top.wrapping_sub(SLACK), self.bottom.wrapping_add(SLACK));
+        if a.u < left && b.u < left && c.u < left && d.u < left
+            || a.u >= right && b.u >= right && c.u >= right && d.u >= right
+            || a.v < top && b.v < top && c.v < top && d.v < top
+            || a.v >= bottom && b.v >= bottom && c.v >= bottom && d.v >= bottom
+        {
+            return Cover::Nothing;
+        }
+        const TWICE: i32 = 2 * SLACK;
+        let (left, right) = (left.wrapping_add(TWICE), right.wrapping_sub(TWICE));
+        let (top, bottom) = (top.wrapping_add(TWICE), bottom.wrapping_sub(TWICE));
+        let inside = |uv: PlayUv| uv.u >= left && uv.u < right && uv.v >= top && uv.v < bottom;
+        if !self.masked() && inside(a) && inside(b) && inside(c) && inside(d) { Cover::All } else { Cover::Part }
+    }
+
     /// Passes those of the rectangle's edges on that what lies between the corners of a block, within `bounds`, may cross.
     #[inline(always)]
     pub fn crossed(&self, corners: &[PlayUv; 4], &Bounds { low, high }: &Bounds, mut pass: impl FnMut(Edge)) {

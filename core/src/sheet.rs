@@ -1,7 +1,6 @@
 //! The sheets of a row of cells at one moment: where each one's corners and middles are.
 //! Rows of nodes come from `row`, sheet lists from the caller's memory; spans go to `span`.
 
-use crate::coverage::Bounds;
 use crate::fixed::PlayUv;
 use crate::grid::Grid;
 use crate::lists::Lists;
@@ -179,25 +178,25 @@ impl Block<'_, '_> {
         [a, b, c, d].map(|layer| layer.uv())
     }
 
-    /// What lies around the left edges of `sheet` in the block and in the one to the right of it, and around the right edge of that one; if cells are
-    /// not quartered, there is no other block: around the cell's edges.
+    /// The ends, above and below, of the left edges of `sheet` in the block and in the one to the right of it, and of the right edge of that one; if
+    /// cells are not quartered, there is no other block: of the cell's edges.
     #[must_use]
     #[inline(always)]
-    pub fn verticals(&self, sheet: &Sheet) -> [Bounds; 3] {
+    pub fn verticals(&self, sheet: &Sheet) -> [[PlayUv; 2]; 3] {
         let [top, halfway, bottom] = self.rows;
         let [a, b, c] = sheet.nodes;
-        let around = |(above, below): (&Layer, &Layer)| Bounds::of(above.uv(), below.uv());
+        let between = |(above, below): (&Layer, &Layer)| [above.uv(), below.uv()];
         let (above, below) = match self.quarter {
             None => {
                 let ([a, b], [c, d]) = (top.ends(a), bottom.ends(c));
-                let right = around((b, d));
-                return [around((a, c)), right, right];
+                let right = between((b, d));
+                return [between((a, c)), right, right];
             }
             Some([_, false]) => (top.thirds(a), halfway.thirds(b)),
             Some([_, true]) => (halfway.thirds(b), bottom.thirds(c)),
         };
         let ([a, b, c], [d, e, f]) = (above, below);
-        [(a, d), (b, e), (c, f)].map(around)
+        [(a, d), (b, e), (c, f)].map(between)
     }
 
     /// Field `which` of `sheet` at the cell's corners, Q16 pixels: straight from edge to edge of the cell, whatever space is.
