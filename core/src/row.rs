@@ -66,6 +66,21 @@ fn mix(from: i8, to: i8, linear: i32) -> i16 {
     (sum >> WEIGHT_BITS).clamp(-32_767, 32_767) as i16
 }
 
+/// Fills `slots`, which are zero, with the fields between those that the codes `from` and `to` stand for, where there are such; no codes: zeros.
+#[inline(always)]
+fn straight<'s>(slots: impl Iterator<Item = &'s mut i16>, from: &[i8], to: &[i8], linear: i32) {
+    let put = |slot: &mut i16, from: i8, to: i8| {
+        if from | to != 0 {
+            *slot = mix(from, to, linear);
+        }
+    };
+    match (from, to) {
+        ([], _) => slots.zip(to).for_each(|(slot, &to)| put(slot, 0, to)),
+        (_, []) => slots.zip(from).for_each(|(slot, &from)| put(slot, from, 0)),
+        _ => slots.zip(from.iter().zip(to)).for_each(|(slot, (&from, &to))| put(slot, from, to)),
+    }
+}
+
 /// Fills every EVERY-th of `slots`, from the first on, with what `four` keys' positions make with these `weights`.
 #[inline(never)]
 fn blend_all<const EVERY: usize>(slots: &mut [Layer], [a, b, c, d]: [&[u32]; 4], weights: Weights, key_bits: u32) {
@@ -269,9 +284,9 @@ impl NodeRow<'_> {
     fn distances(&mut self, chain: Chain, ends: [&Chain; 2], keys: &Around<'_, '_>, linear: i32) {
         let slots = self.field.get_mut(usize::from(chain.at)..).unwrap_or(&mut []);
         let slots = slots.get_mut(..chain.nodes().into()).unwrap_or(&mut []);
+        slots.fill([0; 2]);
         // Most chains are never tested, and have none.
         if ends.iter().all(|end| end.field == NONE) {
-            slots.fill([0; 2]);
             return;
         }
         let [from, to] = [(keys.from, ends[0]), (keys.to, ends[1])].map(|(key, end)| {
@@ -279,12 +294,9 @@ impl NodeRow<'_> {
             let [a, b] = &key.fields;
             [a, b].map(|codes| codes.get(first..).filter(|_| end.field != NONE).unwrap_or(&[]))
         });
-        let code = |codes: &[i8], index: usize| codes.get(index).copied().unwrap_or(0);
-        for (index, slot) in slots.iter_mut().enumerate() {
-            let ([a, b], [c, d]) = (from, to);
-            let [a, b, c, d] = [code(a, index), code(b, index), code(c, index), code(d, index)];
-            *slot = if a | b | c | d == 0 { [0; 2] } else { [mix(a, c, linear), mix(b, d, linear)] };
-        }
+        let ([a, b], [c, d]) = (from, to);
+        straight(slots.iter_mut().map(|[field, _]| field), a, c, linear);
+        straight(slots.iter_mut().map(|[_, field]| field), b, d, linear);
     }
 
     /// Fills the row with what lies halfway between rows `from` and `to`, where both carry it; `before` and `after` are the rows
