@@ -109,21 +109,27 @@ impl Plan<'_> {
         }
         while along < cells && across.left < width {
             // In pictures 512 wide, as most are, and cells of eight pixels; others go by `append` alone. Likewise the cell that the screen's edge cuts.
-            if let Some(Room { window: usual, margin, .. }) = room
-                && (usual == Window::USUAL || usual == Window::NARROW && site.cubic())
+            let most = (width.saturating_sub(across.left) >> 3).min(cells.wrapping_sub(along).into());
+            if most > 0
+                && let Some(room) = &room
+                && (room.window == Window::USUAL || room.window == Window::NARROW && site.cubic())
                 && site.bundle.grid().log2 == 3
             {
-                let most = (width.saturating_sub(across.left) >> 3).min(cells.wrapping_sub(along).into());
                 let rest = lines.map(|line| line.get(usize::from(along).wrapping_mul(across.blocks() as usize)..).unwrap_or(&[]));
-                let more = match (site.cubic(), usual == Window::USUAL) {
-                    (true, true) => self.extend::<9, 2, 2>(across.block, most as usize, (sheet.label(), margin), rest),
-                    (true, false) => self.extend::<8, 2, 2>(across.block, most as usize, (sheet.label(), margin), rest),
-                    (false, _) => self.extend::<9, 1, 3>(across.block, most as usize, (sheet.label(), margin), rest),
+                let (block, label) = (across.block, sheet.label());
+                let extend = |plan: &mut Self| match (site.cubic(), room.window == Window::USUAL) {
+                    (true, true) => plan.extend::<9, 2, 2>(most as usize, room.margin, rest),
+                    (true, false) => plan.extend::<8, 2, 2>(most as usize, room.margin, rest),
+                    (false, _) => plan.extend::<9, 1, 3>(most as usize, room.margin, rest),
                 };
+                let mut more = if self.follows(label, block) { extend(self) } else { 0 };
+                if more == 0 && self.begin(room, label, block, rest) {
+                    more = extend(self);
+                }
                 along = along.wrapping_add(more);
                 across.step(across.blocks().wrapping_mul(more.into()));
-                if along == cells {
-                    break;
+                if more > 0 {
+                    continue;
                 }
             }
             let here = sheet.further(along);
@@ -163,20 +169,34 @@ impl Plan<'_> {
         *kind = kind.wrapping_add(pixels);
     }
 
-    /// Appends smooth cells, the first of which begins with tile `place`, to the last run, as long as they follow it and fit into its window, `most`
-    /// at most; returns how many. `above` and `below` start at their left corners: between each two of these is a tile of 2^LOG2 pixels, TILES a cell.
+    /// Whether tile `place` of `label` comes right after the last run.
+    #[inline(always)]
+    fn follows(&self, label: u8, place: u32) -> bool {
+        let run = self.run.get(self.runs.wrapping_sub(1));
+        run.is_some_and(|run| run.label == u16::from(label) && u32::from(run.place).wrapping_add(u32::from(run.count)) == place)
+    }
+
+    /// Begins a run of no tiles yet, in a window that holds the first tile between the corners on from `above` and `below`; false where there is none.
+    #[inline(never)]
+    fn begin(&mut self, room: &Room, label: u8, place: u32, [above, below]: [&[Layer]; 2]) -> bool {
+        let ([a, b, ..], [c, d, ..]) = (above, below) else { return false };
+        let Some(row) = room.onwards(&[a.uv(), b.uv(), c.uv(), d.uv()]) else { return false };
+        let Some(run) = self.run.get_mut(self.runs) else { return false };
+        *run = Run { place: place as u16, count: 0, tile: self.tiles as u16, row, label: label.into() };
+        self.runs = self.runs.wrapping_add(1);
+        true
+    }
+
+    /// Appends smooth cells to the last run, which they follow, as long as they fit into its window, `most` at most; returns how many. `above` and
+    /// `below` start at their left corners: between each two of these is a tile of 2^LOG2 pixels, TILES a cell.
     #[inline(never)]
     fn extend<const WIDTH: u32, const TILES: usize, const LOG2: u32>(
         &mut self,
-        place: u32,
         most: usize,
-        (label, margin): (u8, i32),
+        margin: i32,
         [above, below]: [&[Layer]; 2],
     ) -> u16 {
         let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return 0 };
-        if run.label != u16::from(label) || u32::from(run.place).wrapping_add(u32::from(run.count)) != place {
-            return 0;
-        }
         let Some(slots) = self.tile.get_mut(self.tiles..) else { return 0 };
         let Some(slots) = slots.get_mut(..most.wrapping_mul(TILES)) else { return 0 };
         let window = Window { width_log2: WIDTH, ..Window::USUAL };
@@ -289,11 +309,7 @@ impl Plan<'_> {
             self.tiles = self.tiles.wrapping_add(1);
             return true;
         }
-        // The window begins or ends at the tile, so that it has room where the run is heading.
-        let [a, b, c, d] = corners;
-        let onwards = b.v.wrapping_add(d.v) >= a.v.wrapping_add(c.v);
-        let row = if onwards { room.row(&bounds) } else { room.row_to(&bounds) };
-        let Some(row) = row else { return false };
+        let Some(row) = room.onwards(&corners) else { return false };
         let Some(run) = self.run.get_mut(self.runs) else { return false };
         *slot = room.window.tile(corners, row, log2);
         *run = Run { place, count: 1, tile: self.tiles as u16, row, label };

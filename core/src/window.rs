@@ -132,6 +132,16 @@ impl Room {
         low.u >= self.margin && high.u < self.right && low.v.wrapping_sub(first) >= self.margin && high.v.wrapping_sub(first) < self.end
     }
 
+    /// The first row of a window that holds a tile of these corners and begins or ends there, so that it has room where a run is heading; `None`
+    /// where there is no such.
+    #[must_use]
+    #[inline]
+    pub fn onwards(&self, corners: &Corners) -> Option<u16> {
+        let [a, b, c, d] = corners;
+        let bounds = Bounds::around(corners);
+        if b.v.wrapping_add(d.v) >= a.v.wrapping_add(c.v) { self.row(&bounds) } else { self.row_to(&bounds) }
+    }
+
     /// The first row of a window that holds what lies within `bounds` and begins there; `None` where there is no such.
     #[must_use]
     #[inline(always)]
