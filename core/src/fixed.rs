@@ -51,6 +51,22 @@ pub struct PlayUv {
     pub v: i32,
 }
 
+impl PlayUv {
+    /// The position `step` further.
+    #[must_use]
+    #[inline(always)]
+    pub const fn plus(self, step: Self) -> Self {
+        Self { u: self.u.wrapping_add(step.u), v: self.v.wrapping_add(step.v) }
+    }
+
+    /// How far it is from `other` on.
+    #[must_use]
+    #[inline(always)]
+    pub const fn less(self, other: Self) -> Self {
+        Self { u: self.u.wrapping_sub(other.u), v: self.v.wrapping_sub(other.v) }
+    }
+}
+
 /// The value halfway from `from` to `to` on the smoothest curve through them and what comes before and after on the same line, where there is
 /// such: the four-point rule (Dyn, Levin, Gregory 1987), a parabola without one of the outer two, the mean without both.
 /// Exact where all are the same.

@@ -200,32 +200,28 @@ impl Plan<'_> {
         let Some(slots) = self.tile.get_mut(self.tiles..) else { return 0 };
         let Some(slots) = slots.get_mut(..most.wrapping_mul(TILES)) else { return 0 };
         let window = Window { width_log2: WIDTH, ..Window::USUAL };
-        let first = i32::from(run.row).wrapping_shl(16);
-        // Inside as far as the margin from either side: one comparison for both.
-        let inside = |x: i32, log2: u32| {
-            let room = 1i32.wrapping_shl(log2.wrapping_add(16)).wrapping_sub(margin.wrapping_mul(2));
-            (x.wrapping_sub(margin) as u32) < room as u32
-        };
-        // `zip` alone would find both, and the slots, by an index, which costs registers.
-        let mut ends = above.iter().zip(below).map_while(|(above, below)| Some((above.uv(), below.uv())));
-        let Some((a, c)) = ends.next() else { return 0 };
-        let (mut u, mut v) = (a.u, a.v.wrapping_sub(first));
-        let (mut down_u, mut down_v) = (c.u.wrapping_sub(a.u), c.v.wrapping_sub(a.v));
+        // From the window's corner, and the margin on from there: inside is what is not negative and below the room, one comparison for both.
+        let corner = PlayUv { u: margin, v: margin.wrapping_add(i32::from(run.row).wrapping_shl(16)) };
+        let room = |log2: u32| 1u32.wrapping_shl(log2.wrapping_add(16)).wrapping_sub((margin as u32).wrapping_mul(2));
+        let (across, down) = (room(window.width_log2), room(window.rows_log2));
+        let margins = window.pack(margin, margin, 0);
+        let mut ends = above.iter().zip(below).map(|(above, below)| [above.uv(), below.uv()].map(|uv| uv.less(corner)));
+        let Some([mut a, mut c]) = ends.next() else { return 0 };
         let mut done = 0usize;
-        for (slot, (b, d)) in slots.iter_mut().zip(ends) {
-            let (right_u, right_v) = (b.u, b.v.wrapping_sub(first));
-            let across = inside(b.u, window.width_log2) && inside(d.u, window.width_log2);
-            if !(across && inside(right_v, window.rows_log2) && inside(d.v.wrapping_sub(first), window.rows_log2)) {
+        for (slot, [b, d]) in slots.iter_mut().zip(ends) {
+            if b.u as u32 >= across || d.u as u32 >= across || b.v as u32 >= down || d.v as u32 >= down {
                 break;
             }
-            let (right_down_u, right_down_v) = (d.u.wrapping_sub(b.u), d.v.wrapping_sub(b.v));
+            let (right, left, below) = (b.less(a), c.less(a), d.less(c));
+            let turn = below.less(right);
             *slot = Tile {
-                at: window.pack(u, v, 0),
-                step: window.pack(right_u.wrapping_sub(u), right_v.wrapping_sub(v), LOG2),
-                down: window.pack(down_u, down_v, LOG2),
-                turn: window.pack(right_down_u.wrapping_sub(down_u), right_down_v.wrapping_sub(down_v), LOG2.wrapping_mul(2)),
+                // The margin is a multiple of what positions are rounded to.
+                at: window.pack(a.u, a.v, 0).wrapping_add(margins),
+                step: window.pack(right.u, right.v, LOG2),
+                down: window.pack(left.u, left.v, LOG2),
+                turn: window.pack(turn.u, turn.v, LOG2.wrapping_mul(2)),
             };
-            (u, v, down_u, down_v) = (right_u, right_v, right_down_u, right_down_v);
+            (a, c) = (b, d);
             done = done.wrapping_add(1);
         }
         // Half a cell is for `append`, which finds the same.

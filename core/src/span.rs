@@ -167,12 +167,6 @@ impl Span {
     }
 }
 
-impl PlayUv {
-    const fn plus(self, step: Self) -> Self {
-        Self { u: self.u.wrapping_add(step.u), v: self.v.wrapping_add(step.v) }
-    }
-}
-
 /// Paints the pixels of `out` that `shown` names, a bit each; `make` turns a position into a pixel, given its place in `out`. Positions outside the
 /// picture count as its edge.
 #[inline(always)]
