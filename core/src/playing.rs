@@ -9,7 +9,7 @@ use crate::format::{self, SPACE_CUBIC, TexelKind};
 use crate::key::Nothing;
 use crate::memory::{self, Workspace};
 use crate::pack::{Picture, Scratch};
-use crate::record::{Place, SLICE_COST, Shape};
+use crate::record::{BYTE_COST, Place, Shape};
 use crate::row::Around;
 use crate::timeline::Moment;
 use crate::work::{Probe, Work};
@@ -49,8 +49,9 @@ struct Coming<'a> {
     /// Slices of it, and how many of them are decoded.
     slices: usize,
     done: usize,
-    /// What there was to do in all, as [`Coming::left`] counts.
-    whole: u64,
+    /// What there was to do in all, as [`Coming::left`] counts, and what is left beside bytes.
+    whole: u32,
+    rest: u32,
     /// Frames of the interval that have no share in it.
     from: u32,
     /// Shares that the seek that began it took beside its own.
@@ -61,10 +62,9 @@ struct Coming<'a> {
 const LEAD: u32 = 3;
 
 impl Coming<'_> {
-    /// What is left to do: bytes of the record, and [`SLICE_COST`] a slice.
-    fn left(&self) -> u64 {
-        let slices = self.slices.saturating_sub(self.done) as u64;
-        slices.saturating_mul(u64::from(SLICE_COST)).saturating_add(self.bits.left() as u64)
+    /// What is left to do, as [`Stream::cost`] counts, and [`BYTE_COST`] a byte.
+    fn left(&self) -> u32 {
+        self.rest.saturating_add((self.bits.left() as u32).saturating_mul(BYTE_COST))
     }
 }
 
@@ -328,16 +328,23 @@ impl<'a> Playing<'a> {
             };
             let place = bundle.place(key, run);
             let slices = place.slices(bundle.grid());
-            let coming = Coming { run, place, bits: Decoder::new(bundle.record(key)), slices, done: 0, whole: 0, from: 0, lead: 0 };
+            let rest = (0..slices).map(|slice| self.cost(place, slice)).fold(0, u32::saturating_add);
             let jumped = self.work.keys > 1 && self.work.keys < u32::from(bundle.limits().seek_keys);
-            Coming { whole: coming.left(), lead: if jumped { LEAD } else { 0 }, ..coming }
+            let (bits, lead) = (Decoder::new(bundle.record(key)), if jumped { LEAD } else { 0 });
+            let coming = Coming { run, place, bits, slices, done: 0, whole: 0, rest, from: 0, lead };
+            Coming { whole: coming.left(), ..coming }
         })
+    }
+
+    /// What a slice of the record at `place` costs to decode, as [`Stream::cost`] has it.
+    fn cost(&self, place: Place, slice: usize) -> u32 {
+        self.space.stream.cost(self.bundle.grid(), place, slice, self.space.backdrop.is_some())
     }
 
     /// Decodes what is missing of `key`, which becomes the last one.
     fn finish(&mut self, key: usize) {
         let mut coming = self.take_up(key);
-        self.decode(&mut coming, 0);
+        self.decode(&mut coming, None);
         self.space.stream.finish();
         self.last = Some(Last { key, run: coming.run, sequence: self.last.map_or(0, |last| last.sequence).saturating_add(1) });
     }
@@ -355,10 +362,8 @@ impl<'a> Playing<'a> {
             // Every frame has the same share, to the nearest slice; the last one does all that is left.
             let share = |frame: u32| frame.saturating_sub(coming.from).saturating_add(coming.lead);
             let (frames, shares) = (share(frame), share(length));
-            let due = coming.whole.saturating_mul(u64::from(frames)).checked_div(u64::from(shares)).unwrap_or(0);
-            let slice = coming.whole.checked_div(coming.slices as u64).unwrap_or(0);
-            let rounded = if frames < shares { due.saturating_sub(slice >> 1) } else { due };
-            let left = coming.whole.saturating_sub(rounded);
+            let due = u64::from(coming.whole).saturating_mul(frames.into()).checked_div(shares.into()).unwrap_or(0) as u32;
+            let left = if frames < shares { Some(coming.whole.saturating_sub(due)) } else { None };
             self.decode(&mut coming, left);
         } else {
             coming.from = coming.from.max(frame);
@@ -366,8 +371,8 @@ impl<'a> Playing<'a> {
         self.coming = Some(coming);
     }
 
-    /// Decodes slices of `coming` until no more than `left` is left to do.
-    fn decode(&mut self, coming: &mut Coming<'a>, left: u64) {
+    /// Decodes slices of `coming` until what is left to do comes closest to `left`; or all of them.
+    fn decode(&mut self, coming: &mut Coming<'a>, left: Option<u32>) {
         let bundle = self.bundle;
         let shape = Shape {
             grid: bundle.grid(),
@@ -378,7 +383,13 @@ impl<'a> Playing<'a> {
             planes: bundle.planes(),
         };
         let bytes = coming.bits.left();
-        while coming.done < coming.slices && coming.left() > left {
+        while let Some(more) = coming.slices.checked_sub(coming.done).filter(|&more| more > 0) {
+            let cost = self.cost(coming.place, coming.done);
+            let share = (coming.bits.left() as u32).saturating_mul(BYTE_COST).checked_div(more as u32).unwrap_or(0);
+            if left.is_some_and(|left| coming.left().saturating_sub(cost.saturating_add(share) >> 1) < left) {
+                break;
+            }
+            coming.rest = coming.rest.saturating_sub(cost);
             self.space.stream.slice(&mut coming.bits, shape, coming.place, coming.done, &mut Nothing);
             coming.done = coming.done.saturating_add(1);
             self.work.slices = self.work.slices.wrapping_add(1);

@@ -5,7 +5,7 @@
 use crate::coder::{Bits, Probability};
 use crate::format::LabelRecord;
 use crate::grid::Grid;
-use crate::key::{Key, Setting, Source};
+use crate::key::{BACKDROP, Key, Setting, Source};
 use crate::lists::{self, Lists};
 use crate::nodes::{self, Layout};
 use crate::plane::{Camera, PLANE_BYTES, Plane, View};
@@ -72,8 +72,11 @@ pub struct Place {
 
 /// Rows of cells whose lists make a slice: about as much work as one row of nodes.
 const LIST_ROWS: usize = 4;
-/// What a slice costs beside the bytes that it reads, in bytes of equal time; measured for both kinds of slice.
-pub const SLICE_COST: u32 = 24;
+/// What a byte, a layer of a row of nodes and a slice of lists cost to code, in parts of equal time: fitted to counted instructions, and then to the
+/// worst frames' (a row of many layers is half a frame's share where keys are close: no estimate evens that out).
+pub const BYTE_COST: u32 = 4;
+const LAYER_COST: u32 = 3;
+const LIST_COST: u32 = 200;
 
 impl Place {
     /// Slices of a record at this place: a few rows of cells or one row of nodes each, about the same work.
@@ -165,6 +168,19 @@ impl<'m> Stream<'m> {
             (self.key_contexts, self.layout) = (key_contexts, layout);
         }
         self.put(now_slot, now, [(list_slot, lists_after), (list_before_slot, lists_before)]);
+    }
+
+    /// What slice `slice` of the record at `place`, which follows the newest, costs to code beside its bytes: its row of nodes has about as many layers
+    /// as the newest record's. `backdrop`: the least label has no positions.
+    #[must_use]
+    pub fn cost(&self, grid: Grid, place: Place, slice: usize, backdrop: bool) -> u32 {
+        let [after, before] = place.list_slices(grid);
+        let Some(row) = slice.checked_sub(after.wrapping_add(before)) else { return LIST_COST };
+        let known = self.key(0).filter(|_| !place.independent).map_or(&[][..], |key| key.chains(row));
+        let chains = known.iter().filter(|chain| !(backdrop && chain.label == BACKDROP));
+        let layers = chains.map(|chain| u32::from(chain.nodes())).fold(0, u32::wrapping_add);
+        let layers = if known.is_empty() { grid.columns as u32 } else { layers };
+        layers.wrapping_mul(LAYER_COST).wrapping_add(1)
     }
 
     /// The record that was coded slice by slice is the newest from now on.
