@@ -141,10 +141,12 @@ impl<'d, 'a> Drawing<'d, 'a> {
     fn mix<P: Paint, const WIDTH: u32, const ROWS: u32>(&self, y: u32, out: &mut [P::Pixel], paint: &P) {
         let log2 = self.site.log2();
         let row = y & (1u32 << log2).wrapping_sub(1);
-        match log2 {
-            2 if P::SHORT => self.sides::<P, WIDTH, ROWS, 4>(row, out, paint),
-            3 if P::SHORT => self.sides::<P, WIDTH, ROWS, 8>(row, out, paint),
-            _ => self.any_sides::<P, WIDTH, ROWS>(row, out, paint),
+        // Pictures wider than 512 texels are rare.
+        match (P::SHORT && WIDTH <= 9, log2) {
+            (true, 2) => self.sides::<P, WIDTH, ROWS, 4>(row, out, paint),
+            // No others have sides.
+            (true, _) => self.sides::<P, WIDTH, ROWS, 8>(row, out, paint),
+            (false, _) => self.any_sides::<P, WIDTH, ROWS>(row, out, paint),
         }
         // Most often there is none.
         if self.plan.plain > 0 {
