@@ -64,8 +64,11 @@ pub struct Bake {
     pub playback: Playback,
     /// Side of a cell of the key-ray grid, pixels: 4, 8, 16 or 32 [default: 8; 16 on screens over 640 wide].
     ///
-    /// Smaller cells follow outlines better and take more bytes and memory. Where neither this nor --key-interval is given, lattices and foliage get
-    /// cells half as large with keys twice as far apart, and rough land cells twice as large with keys twice as close, if that shows more for the bytes.
+    /// Smaller cells follow outlines better and take more bytes and memory. Cells of 16 are what small processors want first: less than half the memory,
+    /// a quarter to two fifths fewer instructions, and hardly a difference where a display shows nearest texels.
+    ///
+    /// Where neither this nor --key-interval is given, lattices and foliage get cells half as large with keys twice as far apart, and rough land cells
+    /// twice as large with keys twice as close, if that shows more for the bytes.
     #[arg(long, value_name = "PX", value_parser = cell)]
     pub cell: Option<u32>,
     /// Frames between keys, 1 to 256 [default: 8].
