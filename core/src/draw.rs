@@ -161,6 +161,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
     #[inline(always)]
     fn sides<P: Paint, const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(&self, row: u32, out: &mut [P::Pixel], paint: &P) {
         let (blocks, rest) = out.as_chunks_mut::<PIXELS>();
+        let whole = blocks.len();
         for side in self.plan.side.get(..self.plan.sides).unwrap_or(&[]) {
             let shown = side.shown.row(row);
             if shown == 0 {
@@ -169,7 +170,9 @@ impl<'d, 'a> Drawing<'d, 'a> {
             // Said twice: of a known size, a loop over pixels is none.
             match blocks.get_mut(usize::from(side.block)) {
                 Some(pixels) => paint.side::<WIDTH, ROWS>(side, row, shown, pixels),
-                None => paint.side::<WIDTH, ROWS>(side, row, shown, rest),
+                // Those after it are beyond the row's end.
+                None if usize::from(side.block) == whole => paint.side::<WIDTH, ROWS>(side, row, shown, rest),
+                None => {}
             }
         }
     }
