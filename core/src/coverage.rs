@@ -71,26 +71,11 @@ impl Chart {
         inside && (!self.masked() || texture.covered(uv))
     }
 
-    /// How much the chart covers of what lies within `bounds`, with some room for rounding.
-    #[must_use]
-    #[inline]
-    pub fn cover(&self, &Bounds { low, high }: &Bounds) -> Cover {
-        let (left, right) = (self.left.wrapping_sub(SLACK), self.right.wrapping_add(SLACK));
-        let (top, bottom) = (self.top.wrapping_sub(SLACK), self.bottom.wrapping_add(SLACK));
-        if high.u < left || low.u >= right || high.v < top || low.v >= bottom {
-            return Cover::Nothing;
-        }
-        const TWICE: i32 = 2 * SLACK;
-        let across = low.u >= left.wrapping_add(TWICE) && high.u < right.wrapping_sub(TWICE);
-        let down = low.v >= top.wrapping_add(TWICE) && high.v < bottom.wrapping_sub(TWICE);
-        if across && down && !self.masked() { Cover::All } else { Cover::Part }
-    }
-
-    /// How much the chart covers of a block whose left and right edges end at these positions: what [`Chart::cover`] says of what lies around them.
-    // Without the bounds: one position mostly tells that not all are beyond an edge.
+    /// How much the chart covers of a block whose left and right edges end at these positions, with some room for rounding.
+    // Without what lies around them: one position mostly tells that not all are beyond an edge.
     #[must_use]
     #[inline(always)]
-    pub fn cover_block(&self, [[a, b], [c, d]]: [[PlayUv; 2]; 2]) -> Cover {
+    pub fn cover(&self, [[a, b], [c, d]]: [[PlayUv; 2]; 2]) -> Cover {
         let (left, right) = (self.left.wrapping_sub(SLACK), self.right.wrapping_add(SLACK));
         let (top, bottom) = (self.top.wrapping_sub(SLACK), self.bottom.wrapping_add(SLACK));
         if a.u < left && b.u < left && c.u < left && d.u < left

@@ -123,7 +123,10 @@ impl Plan<'_> {
                     (false, _) => plan.extend::<9, 1, 3>(most as usize, room.margin, rest),
                 };
                 let mut more = if self.follows(label, block) { extend(self) } else { 0 };
-                if more == 0 && self.begin(room, label, block, rest) {
+                if more == 0
+                    && let [[a, b, ..], [c, d, ..]] = rest
+                    && self.begin(room, label, block, &[a.uv(), b.uv(), c.uv(), d.uv()])
+                {
                     more = extend(self);
                 }
                 along = along.wrapping_add(more);
@@ -176,11 +179,10 @@ impl Plan<'_> {
         run.is_some_and(|run| run.label == u16::from(label) && u32::from(run.place).wrapping_add(u32::from(run.count)) == place)
     }
 
-    /// Begins a run of no tiles yet, in a window that holds the first tile between the corners on from `above` and `below`; false where there is none.
+    /// Begins a run of no tiles yet, in a window that holds the tile of these corners; false where there is none.
     #[inline(never)]
-    fn begin(&mut self, room: &Room, label: u8, place: u32, [above, below]: [&[Layer]; 2]) -> bool {
-        let ([a, b, ..], [c, d, ..]) = (above, below) else { return false };
-        let Some(row) = room.onwards(&[a.uv(), b.uv(), c.uv(), d.uv()]) else { return false };
+    fn begin(&mut self, room: &Room, label: u8, place: u32, corners: &Corners) -> bool {
+        let Some(row) = room.onwards(corners) else { return false };
         let Some(run) = self.run.get_mut(self.runs) else { return false };
         *run = Run { place: place as u16, count: 0, tile: self.tiles as u16, row, label: label.into() };
         self.runs = self.runs.wrapping_add(1);
@@ -252,10 +254,10 @@ impl Plan<'_> {
             return self.plain(across, 1);
         }
         let Some(room) = &across.room else { return false };
-        let label = u16::from(sheet.label());
+        let label = sheet.label();
         let log2 = across.parts_log2;
         if log2 == 0 {
-            return self.tile(across, room, label, across.block as u16, [a, b, c, d]);
+            return self.tile(across, room, label, across.block, [a, b, c, d]);
         }
         // The row of the block's tiles, then one after the other.
         let between = |from: PlayUv, to: PlayUv, part: u32| {
@@ -269,7 +271,7 @@ impl Plan<'_> {
         (0..1u32.wrapping_shl(log2)).all(|part| {
             let corners =
                 [between(a, b, part), between(a, b, part.wrapping_add(1)), between(c, d, part), between(c, d, part.wrapping_add(1))];
-            self.tile(across, room, label, across.block.wrapping_shl(log2).wrapping_add(part) as u16, corners)
+            self.tile(across, room, label, across.block.wrapping_shl(log2).wrapping_add(part), corners)
         })
     }
 
@@ -290,26 +292,21 @@ impl Plan<'_> {
     }
 
     /// Appends the tile at `place` to the last run, or begins another; false where its positions fit no window.
-    fn tile(&mut self, across: &Across<'_, '_, '_>, room: &Room, label: u16, place: u16, corners: Corners) -> bool {
+    fn tile(&mut self, across: &Across<'_, '_, '_>, room: &Room, label: u8, place: u32, corners: Corners) -> bool {
         let log2 = across.log2.wrapping_sub(across.parts_log2);
-        let Some(slot) = self.tile.get_mut(self.tiles) else { return false };
-        let bounds = Bounds::around(&corners);
-        let last = self.runs.wrapping_sub(1);
-        if let Some(run) = self.run.get_mut(last)
-            && run.label == label
-            && run.place.wrapping_add(run.count) == place
-            && room.holds(&bounds, run.row)
-        {
-            *slot = room.window.tile(corners, run.row, log2);
-            run.count = run.count.wrapping_add(1);
-            self.tiles = self.tiles.wrapping_add(1);
-            return true;
+        if self.tiles >= self.tile.len() {
+            return false;
         }
-        let Some(row) = room.onwards(&corners) else { return false };
-        let Some(run) = self.run.get_mut(self.runs) else { return false };
-        *slot = room.window.tile(corners, row, log2);
-        *run = Run { place, count: 1, tile: self.tiles as u16, row, label };
-        (self.tiles, self.runs) = (self.tiles.wrapping_add(1), self.runs.wrapping_add(1));
+        let inside = |run: &Run| room.holds(&Bounds::around(&corners), run.row);
+        let stays = self.follows(label, place) && self.run.get(self.runs.wrapping_sub(1)).is_some_and(inside);
+        if !(stays || self.begin(room, label, place, &corners)) {
+            return false;
+        }
+        let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return false };
+        let Some(slot) = self.tile.get_mut(self.tiles) else { return false };
+        *slot = room.window.tile(corners, run.row, log2);
+        run.count = run.count.wrapping_add(1);
+        self.tiles = self.tiles.wrapping_add(1);
         true
     }
 }

@@ -2,7 +2,7 @@
 //! block by block where several sheets take turns. What is where comes from `plan`; pixels go to the caller's row.
 
 use crate::atlas::Texture;
-use crate::coverage::{Bounds, Chart, Cover};
+use crate::coverage::{Chart, Cover};
 use crate::fixed::PlayUv;
 use crate::sheet::Corners;
 use crate::window::{TILE_LOG2, Tile};
@@ -262,7 +262,7 @@ pub fn covered(mut shown: u32, pixels: usize, span: Span, texture: &Texture<'_>)
 #[inline(always)]
 #[must_use]
 pub fn inside(chart: &Chart, mut shown: u32, pixels: usize, span: Span, texture: &Texture<'_>) -> u32 {
-    match chart.cover(&Bounds::of(span.from, span.at(pixels.wrapping_sub(1)))) {
+    match chart.cover([[span.from, span.at(pixels.wrapping_sub(1))]; 2]) {
         Cover::Nothing => return 0,
         Cover::All => return shown,
         Cover::Part => {}

@@ -199,10 +199,10 @@ pub fn candidates(site: &Site<'_, '_, '_>, strip: u32, sheets: &[Sheet]) -> [u16
         if sheet.test() != FIELD && (asked || asked_right) {
             let [a, b, c] = block.verticals(sheet);
             if asked {
-                on_left = on_left.and(chart.cover_block([a, b]));
+                on_left = on_left.and(chart.cover([a, b]));
             }
             if asked_right {
-                on_right = on_right.and(chart.cover_block([b, c]));
+                on_right = on_right.and(chart.cover([b, c]));
             }
         }
         left.see(bit, on_left);
