@@ -3,14 +3,11 @@
 //! on their way from key to key, keys twice as close show more, and on rough land cells twice as large besides, in less memory. A bundle baked as
 //! usual comes from `job`; the best of a few goes back.
 
-use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings};
+use crate::bake::{BakeError, Flat, Progress, Settings};
 use crate::climb::{Free, Step, climb};
-use crate::encode::image_bytes;
-use crate::metrics;
-use crate::report::grouped;
+use crate::made::Made;
 use crate::scene::Scene;
-use crate::spare::DOUBLE;
-use crate::verify::{self, Quality};
+use crate::verify::Quality;
 
 /// Wrong pixels, percent, from which on smaller cells are worth a try. Most scenes have a tenth of that.
 const TORN: f64 = 2.0;
@@ -19,31 +16,23 @@ const BENT: f64 = 2.0;
 /// Steps tried where positions bend, at most: fast turns want keys much closer.
 const BENT_TRIES: usize = 4;
 
-/// A bundle, what made it, and how good it is.
-pub(crate) struct Made {
-    pub settings: Settings,
-    pub encoded: Encoded,
-    pub quality: Quality,
+/// Why a bundle is of other cells or intervals than usual, and what the usual one was.
+pub(crate) struct Other {
+    why: &'static str,
+    usual: Settings,
+    told: String,
 }
 
-impl Made {
-    /// What `settings` make of it.
-    fn new(scene: &Scene, flat: &Flat, settings: Settings) -> Result<Self, BakeError> {
-        let encoded = bake::encode(scene, flat, &settings, &|_, _| {})?;
-        let quality = verify::against_exact(&encoded.bundle, &flat.atlas, &|_, _| {})?;
-        Ok(Self { settings, encoded, quality })
-    }
-
-    /// Quality less what `picture` bytes leave for keys, dB.
-    fn worth(&self, picture: usize) -> f64 {
-        metrics::worth(self.quality.psnr_mean, self.encoded.bundle.len().saturating_sub(picture) as u64, DOUBLE)
-    }
-
-    /// What it is in the words of a warning.
-    fn told(&self) -> String {
-        let Self { encoded: Encoded { bundle, .. }, quality, .. } = self;
-        let memory = verify::memory(bundle).map(grouped).unwrap_or_default();
-        format!("{:.1} dB in a bundle of {} B and {memory} B of memory", quality.psnr_mean, grouped(bundle.len()))
+impl Other {
+    /// What the user should know about `made`.
+    pub fn said(&self, made: &Made) -> String {
+        let Self { why, usual: Settings { cell, key_interval, .. }, told } = self;
+        format!(
+            "{why}: --cell {} --key-interval {} are used, {}; with {cell} and {key_interval} it were {told}: give --cell {cell} for that",
+            made.settings.cell,
+            made.settings.key_interval,
+            made.told(),
+        )
     }
 }
 
@@ -62,24 +51,23 @@ fn climbs(quality: &Quality) -> Option<(&'static [Climb], &'static str)> {
     }
 }
 
-/// `usual`, or a bundle of other cells or intervals if that is worth more, as sparing counts it; and then what the user should know about it.
+/// `usual`, or a bundle of other cells or intervals if that is worth more, as sparing counts it; and then why.
 ///
 /// # Errors
 /// Those of encoding, and of the player.
-pub(crate) fn choose(scene: &Scene, flat: &Flat, usual: Made, progress: Progress<'_>) -> Result<(Made, Option<String>), BakeError> {
+pub(crate) fn choose(scene: &Scene, flat: &Flat, usual: Made, progress: Progress<'_>) -> Result<(Made, Option<Other>), BakeError> {
     let Some((climbs, why)) = climbs(&usual.quality) else { return Ok((usual, None)) };
-    let picture = image_bytes(&flat.atlas.image, usual.settings.atlas.storage);
     let free = Free { cell: true, interval: true, lambda: false, time: false, space: false, frames: scene.playback.frames };
     let mut better: Option<Made> = None;
     let all: usize = climbs.iter().map(|(_, tries)| tries).sum();
     let mut tried = 0;
     for &(steps, tries) in climbs {
-        climb((usual.settings, usual.worth(picture)), &free, steps, tries, |settings| {
+        climb((usual.settings, usual.worth(flat)), &free, steps, tries, |settings| {
             progress("trying other cells", f64::from(tried) / all as f64);
             tried += 1;
             let made = Made::new(scene, flat, *settings)?;
-            let worth = made.worth(picture);
-            if worth > better.as_ref().unwrap_or(&usual).worth(picture) {
+            let worth = made.worth(flat);
+            if worth > better.as_ref().unwrap_or(&usual).worth(flat) {
                 better = Some(made);
             }
             Ok(Some(worth))
@@ -89,21 +77,15 @@ pub(crate) fn choose(scene: &Scene, flat: &Flat, usual: Made, progress: Progress
         }
     }
     let Some(better) = better else { return Ok((usual, None)) };
-    let Settings { cell, key_interval, .. } = usual.settings;
-    let said = format!(
-        "{why}: --cell {} --key-interval {} are used, {}; with {cell} and {key_interval} it were {}: give --cell {cell} for that",
-        better.settings.cell,
-        better.settings.key_interval,
-        better.told(),
-        usual.told(),
-    );
-    Ok((better, Some(said)))
+    let other = Other { why, usual: usual.settings, told: usual.told() };
+    Ok((better, Some(other)))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::scene::builtin;
+    use crate::{bake, verify};
 
     fn made(name: &str, size: [u32; 2], frames: u32, settings: Settings) -> (Scene, Flat, Made) {
         let mut scene = builtin::build(name).unwrap();
@@ -117,8 +99,8 @@ mod tests {
     fn pictures_that_come_out_right_keep_their_cells() {
         let (scene, flat, coarse) = made("cone-orbit", [160, 120], 65, Settings::default());
         let bytes = coarse.encoded.bundle.clone();
-        let (kept, said) = choose(&scene, &flat, coarse, &|_, _| {}).unwrap();
-        assert_eq!((kept.settings.cell, kept.encoded.bundle == bytes, said), (Settings::default().cell, true, None));
+        let (kept, other) = choose(&scene, &flat, coarse, &|_, _| {}).unwrap();
+        assert_eq!((kept.settings.cell, kept.encoded.bundle == bytes, other.is_none()), (Settings::default().cell, true, true));
     }
 
     #[test]
@@ -127,9 +109,9 @@ mod tests {
         let settings = Settings { cell: 16, key_interval: 4, ..Settings::default() };
         let (scene, flat, coarse) = made("round-columns", [64, 48], 17, settings);
         let before = coarse.quality.psnr_mean;
-        let (kept, said) = choose(&scene, &flat, coarse, &|_, _| {}).unwrap();
+        let (kept, other) = choose(&scene, &flat, coarse, &|_, _| {}).unwrap();
         let after = verify::against_exact(&kept.encoded.bundle, &flat.atlas, &|_, _| {}).unwrap();
-        assert_eq!((kept.settings.cell, kept.settings.key_interval, said.is_some()), (8, 8, true));
+        assert_eq!((kept.settings.cell, kept.settings.key_interval, other.is_some()), (8, 8, true));
         assert!(after.psnr_mean > before + 0.5 && after.psnr_mean == kept.quality.psnr_mean, "{before} {after:?}");
     }
 
@@ -138,12 +120,11 @@ mod tests {
         // Keys so far apart that no curve through them follows the hills.
         let settings = Settings { cell: 8, key_interval: 16, ..Settings::default() };
         let (scene, flat, usual) = made("terrain", [96, 72], 65, settings);
-        let picture = image_bytes(&flat.atlas.image, settings.atlas.storage);
-        let (before, told) = (usual.worth(picture), usual.told());
-        let (kept, said) = choose(&scene, &flat, usual, &|_, _| {}).unwrap();
+        let (before, told) = (usual.worth(&flat), usual.told());
+        let (kept, other) = choose(&scene, &flat, usual, &|_, _| {}).unwrap();
         assert_eq!((kept.settings.cell, kept.settings.key_interval), (16, 8));
-        let said = said.unwrap();
-        assert!(kept.worth(picture) > before && said.contains(&told) && said.contains("--cell 16 --key-interval 8"), "{before} {said}");
+        let said = other.unwrap().said(&kept);
+        assert!(kept.worth(&flat) > before && said.contains(&told) && said.contains("--cell 16 --key-interval 8"), "{before} {said}");
     }
 
     #[test]
@@ -152,8 +133,8 @@ mod tests {
         let settings = Settings { cell: 8, key_interval: 8, ..Settings::default() };
         let (scene, flat, usual) = made("cone-orbit", [96, 72], 9, settings);
         let before = usual.quality.psnr_mean;
-        let (kept, said) = choose(&scene, &flat, usual, &|_, _| {}).unwrap();
-        assert!(kept.settings.key_interval < 8 && kept.quality.psnr_mean > before + 2.0, "{before} {said:?}");
+        let (kept, _) = choose(&scene, &flat, usual, &|_, _| {}).unwrap();
+        assert!(kept.settings.key_interval < 8 && kept.quality.psnr_mean > before + 2.0, "{before} {}", kept.told());
     }
 
     #[test]

@@ -5,10 +5,12 @@ use crate::atlas::{self, Storage};
 use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings, Sparing};
 use crate::chart::{self, Choice, Family};
 use crate::choose;
-use crate::finer::{self, Made};
+use crate::finer;
 use crate::inspect::Inspection;
+use crate::made::Made;
 use crate::report::{Origin, Report, Seconds};
 use crate::scene::Scene;
+use crate::straight;
 use crate::truth::{Truth, spread};
 use crate::{tune, verify};
 use std::time::Instant;
@@ -194,7 +196,10 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
     let (exact_seconds, finer_start) = (exact_start.elapsed().as_secs_f64(), Instant::now());
     let free = options.goal == Goal::AsSet && options.cell.is_none() && options.key_interval.is_none();
     let made = Made { settings, encoded, quality };
-    let (made, finer) = if free { finer::choose(scene, &flat, made, progress)? } else { (made, None) };
+    let (made, other) = if free { finer::choose(scene, &flat, made, progress)? } else { (made, None) };
+    let bends = options.goal == Goal::AsSet && options.space.is_none();
+    let (made, spaces) = if bends { straight::choose(scene, &flat, made, progress)? } else { (made, Vec::new()) };
+    let finer = other.map(|other| other.said(&made));
     let Made { settings, encoded, quality } = made;
     let (search_seconds, verify_start) = (search_seconds + finer_start.elapsed().as_secs_f64(), Instant::now());
     let inspection = Inspection::of(&encoded.bundle).map_err(verify::VerifyError::from)?;
@@ -221,7 +226,7 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
         verify: exact_seconds + verify_start.elapsed().as_secs_f64(),
         search: choice_seconds + search_seconds,
     };
-    let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings };
+    let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings, spaces };
     let mut report = Report::new(&origin, &inspection, quality, truth, work, seconds);
     report.warnings.extend(warnings.into_iter().chain(finer));
     Ok(Baked { bundle: encoded.bundle, report, flat })

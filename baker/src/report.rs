@@ -5,8 +5,9 @@ use crate::atlas::Storage;
 use crate::bake::{Encoded, Flat, Settings};
 use crate::causes::Causes;
 use crate::chart::{self, Family, Trial};
-use crate::inspect::Inspection;
+use crate::inspect::{Inspection, space_name, time_name};
 use crate::scene::Scene;
+use crate::straight;
 use crate::verify::{Quality, TruthQuality, Work};
 use cubist_core::format::{ATLAS, LABELS, MASK, TexelKind};
 use serde::{Deserialize, Serialize};
@@ -36,7 +37,7 @@ pub struct Seconds {
 }
 
 /// The key-ray grid.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Grid {
     /// Side of a cell, pixels.
     pub cell: u32,
@@ -44,6 +45,15 @@ pub struct Grid {
     pub key_interval: u32,
     /// Keys.
     pub keys: usize,
+    /// How positions are interpolated between keys, as `--time` has it.
+    #[serde(default)]
+    pub time: String,
+    /// How positions are interpolated between the corners of cells, as `--space` has it.
+    #[serde(default)]
+    pub space: String,
+    /// The kinds of space that were tried, and what came of them; empty where none was.
+    #[serde(default)]
+    pub spaces: Vec<straight::Trial>,
 }
 
 /// Bytes by section; `bundle` is the sum of `atlas`, `labels`, `mask`, `keys` and `other`.
@@ -163,6 +173,8 @@ pub(crate) struct Origin<'a> {
     pub flat: &'a Flat,
     pub encoded: &'a Encoded,
     pub settings: &'a Settings,
+    /// Kinds of space that were tried.
+    pub spaces: Vec<straight::Trial>,
 }
 
 impl Report {
@@ -175,7 +187,7 @@ impl Report {
         work: Work,
         seconds: Seconds,
     ) -> Self {
-        let Origin { scene, flat, encoded, settings } = origin;
+        let Origin { scene, flat, encoded, settings, .. } = origin;
         let play = &scene.playback;
         let frames = f64::from(play.frames.max(1));
         let (atlas, labels, mask) = (inspection.section_bytes(ATLAS), inspection.section_bytes(LABELS), inspection.section_bytes(MASK));
@@ -190,7 +202,14 @@ impl Report {
             triangles: scene.triangles.len(),
             rays: flat.rays,
             seconds,
-            grid: Grid { cell: settings.cell, key_interval: settings.key_interval, keys: encoded.grid.keys.len() },
+            grid: Grid {
+                cell: settings.cell,
+                key_interval: settings.key_interval,
+                keys: encoded.grid.keys.len(),
+                time: time_name(settings.time).to_owned(),
+                space: space_name(settings.space).to_owned(),
+                spaces: origin.spaces.clone(),
+            },
             source_image: Source {
                 width: image.width,
                 height: image.height,
@@ -248,7 +267,7 @@ fn finer(cell: u32, interval: u32) -> &'static str {
 
 /// What the pipeline itself warns of.
 fn warnings(origin: &Origin<'_>) -> Vec<String> {
-    let Origin { scene, flat, encoded, settings } = origin;
+    let Origin { scene, flat, encoded, settings, .. } = origin;
     let figures = &flat.atlas.figures;
     let mut out = Vec::new();
     let dropped = 100.0 * encoded.dropped_pixels as f64 / flat.rays.max(1) as f64;
@@ -317,7 +336,11 @@ pub fn table(report: &Report) -> Vec<(String, String)> {
     row("playback", format!("{} frames of {width} x {height}, {} frames/s{looping}", report.frames, report.fps));
     // A path shorter than the interval has keys at its ends all the same.
     let every = grid.key_interval.min(report.frames.saturating_sub(1).max(1));
-    row("grid", format!("{} keys, one every {every} frames; cells of {} pixels", grid.keys, grid.cell));
+    let Grid { keys, cell, time, space, .. } = grid;
+    row("grid", format!("{keys} keys, one every {every} frames; cells of {cell} pixels; time {time}, space {space}"));
+    if !grid.spaces.is_empty() {
+        row("", straight::reason(&grid.spaces));
+    }
     row(
         "source image",
         format!(

@@ -77,7 +77,7 @@ fn the_report_has_the_keys_that_scripts_rely_on() {
     let b = &report.bytes;
     assert_eq!(b.bundle, b.atlas + b.labels + b.mask + b.keys + b.other);
     let read: Report = serde_json::from_str(&report.json()).unwrap();
-    assert_eq!((read.grid, read.memory, read.bytes.bundle), (report.grid, report.memory, report.bytes.bundle));
+    assert_eq!((&read.grid, read.memory, read.bytes.bundle), (&report.grid, report.memory, report.bytes.bundle));
     let rows = report::table(&report);
     for name in ["source image", "keys", "bundle", "PSNR", "wrong surface", "working memory", "seconds"] {
         assert_eq!(rows.iter().filter(|(row, _)| row == name).count(), 1, "{name}");

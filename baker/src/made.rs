@@ -1,0 +1,41 @@
+//! A bundle as choices weigh it: what made it, how good it is, and what it costs. `job` makes the usual one; `finer` and `straight` make others.
+
+use crate::bake::{self, BakeError, Encoded, Flat, Settings};
+use crate::encode::image_bytes;
+use crate::metrics;
+use crate::report::grouped;
+use crate::scene::Scene;
+use crate::spare::DOUBLE;
+use crate::verify::{self, Quality};
+
+/// A bundle, what made it, and how good it is.
+pub(crate) struct Made {
+    pub settings: Settings,
+    pub encoded: Encoded,
+    pub quality: Quality,
+}
+
+impl Made {
+    /// What `settings` make of it.
+    ///
+    /// # Errors
+    /// Those of encoding, and of the player.
+    pub fn new(scene: &Scene, flat: &Flat, settings: Settings) -> Result<Self, BakeError> {
+        let encoded = bake::encode(scene, flat, &settings, &|_, _| {})?;
+        let quality = verify::against_exact(&encoded.bundle, &flat.atlas, &|_, _| {})?;
+        Ok(Self { settings, encoded, quality })
+    }
+
+    /// Quality less what all but its source image takes, dB, as sparing counts it.
+    pub fn worth(&self, flat: &Flat) -> f64 {
+        let picture = image_bytes(&flat.atlas.image, self.settings.atlas.storage);
+        metrics::worth(self.quality.psnr_mean, self.encoded.bundle.len().saturating_sub(picture) as u64, DOUBLE)
+    }
+
+    /// What it is in the words of a warning.
+    pub fn told(&self) -> String {
+        let Self { encoded: Encoded { bundle, .. }, quality, .. } = self;
+        let memory = verify::memory(bundle).map(grouped).unwrap_or_default();
+        format!("{:.1} dB in a bundle of {} B and {memory} B of memory", quality.psnr_mean, grouped(bundle.len()))
+    }
+}
