@@ -11,8 +11,14 @@ use crate::verify::Quality;
 
 /// Wrong pixels, percent, from which on smaller cells are worth a try. Most scenes have a tenth of that.
 const TORN: f64 = 2.0;
-/// Texels that a pixel in a hundred is off by, from which on closer keys are worth a try. Most scenes have a half to three quarters of that.
+/// Texels that a pixel in a hundred is off by, from which on closer keys are worth a try, and keys farther apart are not. Most scenes have a half to
+/// three quarters of that.
 const BENT: f64 = 2.0;
+/// Texels of the same up to which cells smaller than [`USUAL`] are worth a try: their keys are farther apart, and what bends on the way then shows.
+/// In larger cells it may be the cell that surfaces bend in.
+const STEADY: f64 = 1.0;
+/// Side of a cell that is neither large nor small, pixels.
+const USUAL: u32 = 8;
 /// Steps tried where positions bend, at most: fast turns want keys much closer.
 const BENT_TRIES: usize = 4;
 
@@ -39,16 +45,20 @@ impl Other {
 /// Steps to climb by, and how many tries they get.
 type Climb = (&'static [Step], usize);
 
-/// The climbs worth a try after settings gave `quality`, the second one if the first leads nowhere; and why.
-fn climbs(quality: &Quality) -> Option<(&'static [Climb], &'static str)> {
-    if quality.wrong_surface_percent >= TORN {
-        // Smaller cells are there for the picture: keys still farther apart would take that back.
-        Some((&[(&[Step::FINER], 1), (&[Step::DOUBLE], 1)], "many outlines cross every cell"))
-    } else if quality.path_error_texels.p99 >= BENT {
-        Some((&[(&[Step::COARSER, Step::HALF], BENT_TRIES)], "surfaces bend on their way from key to key"))
-    } else {
-        None
-    }
+/// The climbs worth a try after cells of `cell` pixels gave `quality`, the second one if the first leads nowhere; and why.
+fn climbs(cell: u32, quality: &Quality) -> Option<(&'static [Climb], &'static str)> {
+    // Smaller cells are there for the picture: keys still farther apart would take that back.
+    const FINER: Climb = (&[Step::FINER], 1);
+    const FARTHER: Climb = (&[Step::DOUBLE], 1);
+    const CLOSER: Climb = (&[Step::COARSER, Step::HALF], BENT_TRIES);
+    let (torn, bent) = (quality.wrong_surface_percent >= TORN, quality.path_error_texels.p99);
+    let climbs: &[Climb] = match torn {
+        true if bent < STEADY || cell > USUAL => &[FINER, FARTHER],
+        true if bent < BENT => &[FARTHER],
+        false if bent >= BENT => &[CLOSER],
+        _ => return None,
+    };
+    Some((climbs, if torn { "many outlines cross every cell" } else { "surfaces bend on their way from key to key" }))
 }
 
 /// `usual`, or a bundle of other cells or intervals if that is worth more, as sparing counts it; and then why.
@@ -56,7 +66,7 @@ fn climbs(quality: &Quality) -> Option<(&'static [Climb], &'static str)> {
 /// # Errors
 /// Those of encoding, and of the player.
 pub(crate) fn choose(scene: &Scene, flat: &Flat, usual: Made, progress: Progress<'_>) -> Result<(Made, Option<Other>), BakeError> {
-    let Some((climbs, why)) = climbs(&usual.quality) else { return Ok((usual, None)) };
+    let Some((climbs, why)) = climbs(usual.settings.cell, &usual.quality) else { return Ok((usual, None)) };
     let free = Free { cell: true, interval: true, lambda: false, time: false, space: false, frames: scene.playback.frames };
     let mut better: Option<Made> = None;
     let all: usize = climbs.iter().map(|(_, tries)| tries).sum();
@@ -138,14 +148,14 @@ mod tests {
     }
 
     #[test]
-    fn nothing_is_tried_where_neither_outlines_nor_bends_are_many() {
-        let tried = |wrong_surface_percent, p99| {
+    fn what_is_tried_depends_on_outlines_and_bends() {
+        let tried = |cell, wrong_surface_percent, p99| {
             let path_error_texels = verify::PathError { p99, ..verify::PathError::default() };
-            climbs(&Quality { wrong_surface_percent, path_error_texels, ..Quality::default() })
-                .map(|(_, why)| why.split(' ').next().unwrap())
+            climbs(cell, &Quality { wrong_surface_percent, path_error_texels, ..Quality::default() })
+                .map(|(climbs, why)| (climbs.len(), why.split(' ').next().unwrap()))
         };
-        // Torn, whether or not bent; bent; neither.
-        assert_eq!([tried(2.0, 0.0), tried(2.0, 9.0), tried(1.9, 2.0)], [Some("many"), Some("many"), Some("surfaces")]);
-        assert_eq!(tried(1.9, 1.9), None);
+        // Torn and steady, torn and not quite so, both torn and bent, the last in large cells; bent; neither.
+        assert_eq!([tried(8, 2.0, 0.9), tried(8, 2.0, 1.0), tried(8, 2.0, 2.0)], [Some((2, "many")), Some((1, "many")), None]);
+        assert_eq!([tried(16, 2.0, 2.0), tried(8, 1.9, 2.0), tried(8, 1.9, 1.9)], [Some((2, "many")), Some((1, "surfaces")), None]);
     }
 }
