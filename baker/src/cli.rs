@@ -88,9 +88,9 @@ pub struct Bake {
     pub time: Option<Time>,
     /// How surfaces bend between the corners of cells [default: linear where that is worth as much, else cubic].
     ///
-    /// Cubic halves every cell along curves through the corners around it: large flat surfaces seen at a slant want that. Linear draws in a quarter to
-    /// a third fewer instructions and takes less memory; on most models of many small faces nothing shows the difference. Without this both are
-    /// made, and the report has the figures of both. Searches (--budget, --psnr) take cubic; --ram tries what fits.
+    /// Cubic halves every cell along curves through the corners around it: large flat surfaces seen at a slant want that. Linear takes less memory, and
+    /// in cells of 4 and 8 pixels draws in a fifth to a third fewer instructions; on most models of many small faces nothing shows the difference.
+    /// Without this both are made in such cells, and the report has the figures of both. Searches (--budget, --psnr) take cubic; --ram tries what fits.
     #[arg(long, value_enum, value_name = "KIND")]
     pub space: Option<Space>,
     /// Largest side of the source image, texels, 64 to 1024.

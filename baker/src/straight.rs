@@ -1,5 +1,5 @@
 //! Straight space: a bundle whose surfaces bend between the corners of cells comes from `job`; one where they run straight goes back if that is
-//! worth as much. It plays in a quarter to a third fewer instructions and an eighth to a fifth less memory. Large flat surfaces seen at a slant
+//! worth as much. It plays in a fifth to a third fewer instructions and an eighth to a fifth less memory. Large flat surfaces seen at a slant
 //! want the curve, most meshes show no difference.
 
 use crate::bake::{BakeError, Flat, Progress, Settings};
@@ -11,6 +11,8 @@ use crate::verify;
 use cubist_core::format::SPACE_LINEAR;
 use serde::{Deserialize, Serialize};
 
+/// Side of the largest cells that go straight, pixels: in larger ones the player draws outlines pixel by pixel then, which takes longer than curves do.
+const MOST: u32 = 8;
 /// What curves have to gain to be used, dB: bytes of keys count as sparing counts them.
 const GAIN: f64 = 0.1;
 
@@ -35,11 +37,15 @@ impl Trial {
     }
 }
 
-/// `curved`, or what is made of the scene with straight space if that is worth as much; and both as they were tried, the straight one last.
+/// `curved`, or what is made of the scene with straight space if that is worth as much; and both as they were tried, the straight one last. In large
+/// cells nothing is tried.
 ///
 /// # Errors
 /// Those of encoding, and of the player.
 pub(crate) fn choose(scene: &Scene, flat: &Flat, curved: Made, progress: Progress<'_>) -> Result<(Made, Vec<Trial>), BakeError> {
+    if curved.settings.cell > MOST {
+        return Ok((curved, Vec::new()));
+    }
     progress("trying straight space", 0.0);
     let straight = Made::new(scene, flat, Settings { space: SPACE_LINEAR, ..curved.settings })?;
     progress("trying straight space", 1.0);
@@ -63,10 +69,10 @@ mod tests {
     use crate::scene::builtin;
     use cubist_core::format::SPACE_CUBIC;
 
-    fn chosen(name: &str, size: [u32; 2], frames: u32) -> (u8, Vec<Trial>) {
+    fn chosen(name: &str, size: [u32; 2], frames: u32, cell: u32) -> (u8, Vec<Trial>) {
         let mut scene = builtin::build(name).unwrap();
         (scene.playback.width, scene.playback.height, scene.playback.frames) = (size[0], size[1], frames);
-        let settings = Settings::default();
+        let settings = Settings { cell, ..Settings::default() };
         let flat = bake::flatten(&scene, &settings.atlas, &|_, _| {}).unwrap();
         let (made, trials) = choose(&scene, &flat, Made::new(&scene, &flat, settings).unwrap(), &|_, _| {}).unwrap();
         (made.settings.space, trials)
@@ -74,15 +80,20 @@ mod tests {
 
     #[test]
     fn a_floor_at_a_slant_keeps_its_curves() {
-        let (space, trials) = chosen("cone-orbit", [160, 120], 33);
+        let (space, trials) = chosen("cone-orbit", [160, 120], 33, 8);
         assert_eq!(space, SPACE_CUBIC, "{}", reason(&trials));
         assert!(trials[0].psnr > trials[1].psnr + 1.0 && trials[0].memory > trials[1].memory, "{}", reason(&trials));
     }
 
     #[test]
     fn rough_land_goes_straight() {
-        let (space, trials) = chosen("terrain", [160, 120], 33);
+        let (space, trials) = chosen("terrain", [160, 120], 33, 8);
         assert_eq!(space, SPACE_LINEAR, "{}", reason(&trials));
         assert_eq!(trials.iter().map(|t| t.space.as_str()).collect::<Vec<_>>(), ["cubic", "linear"]);
+    }
+
+    #[test]
+    fn large_cells_stay_curved() {
+        assert_eq!(chosen("terrain", [96, 72], 9, 16), (SPACE_CUBIC, Vec::new()));
     }
 }
