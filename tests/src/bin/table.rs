@@ -33,7 +33,7 @@ struct Arguments {
 
 #[derive(Subcommand)]
 enum Name {
-    /// Every built-in scene at its own playback and default settings.
+    /// Every built-in scene at its own playback, as cubist-bake bakes it without options.
     Builtin,
     /// Every scene file (.toml) of a folder.
     Scenes {

@@ -1,18 +1,18 @@
-//! The table of scenes: what each costs and how well it plays, at its own playback and default settings.
+//! The table of scenes: what each costs and how well it plays, at its own playback, as `cubist-bake` bakes it without options.
 //! Scenes come from the command `table`, figures from `figures`; the table goes back.
 
 use super::{Table, markdown, number};
-use crate::{figures, scenes};
+use crate::figures;
 use anyhow::{Context, Result, bail};
-use cubist_baker::bake::Settings;
+use cubist_baker::TruthFrames;
+use cubist_baker::job::{self, Baked, Options};
 use cubist_baker::scene::Scene;
 use cubist_core::Bundle;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 /// The columns: the key in JSON, the title, digits after the point.
-const COLUMNS: [(&str, &str, usize); 14] = [
+const COLUMNS: [(&str, &str, usize); 15] = [
     ("scene", "scene", 0),
     ("triangles", "triangles", 0),
     ("bundle_bytes", "bundle", 0),
@@ -27,6 +27,7 @@ const COLUMNS: [(&str, &str, usize); 14] = [
     ("bake_seconds", "bake s", 1),
     ("host_frames_per_second", "host frames/s", 0),
     ("labels", "labels", 0),
+    ("space", "space", 0),
 ];
 
 /// The figures of one scene.
@@ -35,12 +36,11 @@ const COLUMNS: [(&str, &str, usize); 14] = [
 /// The baker's.
 pub fn measure(scene: &Scene) -> Result<Value> {
     eprintln!("{}: baking", scene.name);
-    let start = Instant::now();
-    let (flat, encoded) = scenes::bake(scene, &Settings::default())?;
-    let seconds = start.elapsed().as_secs_f64();
+    let options = Options { truth: TruthFrames::None, ..Options::default() };
+    let Baked { bundle: bytes, report, flat } = job::run(scene, &options, &|_, _| {}).with_context(|| format!("bake {}", scene.name))?;
     eprintln!("{}: playing", scene.name);
-    let bundle = Bundle::parse(&encoded.bundle).with_context(|| format!("parse the bundle of {}", scene.name))?;
-    let quality = figures::quality(&encoded.bundle, &flat.atlas)?;
+    let bundle = Bundle::parse(&bytes).with_context(|| format!("parse the bundle of {}", scene.name))?;
+    let quality = figures::quality(&bytes, &flat.atlas)?;
     let atlas = bundle.atlas();
     Ok(json!({
         "scene": scene.name,
@@ -48,17 +48,19 @@ pub fn measure(scene: &Scene) -> Result<Value> {
         "frames": bundle.frames(),
         "triangles": scene.triangles.len(),
         "labels": bundle.label_count(),
-        "bundle_bytes": encoded.bundle.len(),
+        "bundle_bytes": bytes.len(),
         "atlas_bytes": atlas.texels.len() + atlas.palette.len(),
-        "key_bytes_per_frame": figures::key_bytes_per_frame(&encoded.bundle)?,
-        "bytes_per_frame": encoded.bundle.len() as f64 / f64::from(bundle.frames()),
+        "key_bytes_per_frame": figures::key_bytes_per_frame(&bytes)?,
+        "bytes_per_frame": bytes.len() as f64 / f64::from(bundle.frames()),
         "psnr_mean": quality.psnr_mean,
         "psnr_min": quality.psnr_min,
         "wrong_surface_percent": quality.wrong_surface_percent,
         "torn_percent": quality.torn_percent,
         "memory_bytes": bundle.memory_needed(),
-        "bake_seconds": seconds,
-        "host_frames_per_second": figures::speed(&encoded.bundle, bundle.frames())?,
+        "bake_seconds": report.seconds.total,
+        "cell": report.grid.cell,
+        "space": report.grid.space,
+        "host_frames_per_second": figures::speed(&bytes, bundle.frames())?,
     }))
 }
 
