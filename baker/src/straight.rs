@@ -1,5 +1,5 @@
 //! Straight space: a bundle whose surfaces bend between the corners of cells comes from `job`; one where they run straight goes back if that is
-//! worth as much. It plays in a fifth to a third fewer instructions and an eighth to a fifth less memory. Large flat surfaces seen at a slant
+//! worth as much. It plays in a fifth to a third fewer instructions and a tenth to a fifth less memory. Large flat surfaces seen at a slant
 //! want the curve, most meshes show no difference.
 
 use crate::bake::{BakeError, Flat, Progress, Settings};
