@@ -67,17 +67,18 @@ fn climbs(cell: u32, quality: &Quality) -> Option<(&'static [Climb], &'static st
 /// Those of encoding, and of the player.
 pub(crate) fn choose(scene: &Scene, flat: &Flat, usual: Made, progress: Progress<'_>) -> Result<(Made, Option<Other>), BakeError> {
     let Some((climbs, why)) = climbs(usual.settings.cell, &usual.quality) else { return Ok((usual, None)) };
+    let picture = usual.picture(flat);
     let free = Free { cell: true, interval: true, lambda: false, time: false, space: false, frames: scene.playback.frames };
     let mut better: Option<Made> = None;
     let all: usize = climbs.iter().map(|(_, tries)| tries).sum();
     let mut tried = 0;
     for &(steps, tries) in climbs {
-        climb((usual.settings, usual.worth(flat)), &free, steps, tries, |settings| {
+        climb((usual.settings, usual.worth(picture)), &free, steps, tries, |settings| {
             progress("trying other cells", f64::from(tried) / all as f64);
             tried += 1;
             let made = Made::new(scene, flat, *settings)?;
-            let worth = made.worth(flat);
-            if worth > better.as_ref().unwrap_or(&usual).worth(flat) {
+            let worth = made.worth(picture);
+            if worth > better.as_ref().unwrap_or(&usual).worth(picture) {
                 better = Some(made);
             }
             Ok(Some(worth))
@@ -130,11 +131,12 @@ mod tests {
         // Keys so far apart that no curve through them follows the hills.
         let settings = Settings { cell: 8, key_interval: 16, ..Settings::default() };
         let (scene, flat, usual) = made("terrain", [96, 72], 65, settings);
-        let (before, told) = (usual.worth(&flat), usual.told());
+        let picture = usual.picture(&flat);
+        let (before, told) = (usual.worth(picture), usual.told());
         let (kept, other) = choose(&scene, &flat, usual, &|_, _| {}).unwrap();
         assert_eq!((kept.settings.cell, kept.settings.key_interval), (16, 8));
         let said = other.unwrap().said(&kept);
-        assert!(kept.worth(&flat) > before && said.contains(&told) && said.contains("--cell 16 --key-interval 8"), "{before} {said}");
+        assert!(kept.worth(picture) > before && said.contains(&told) && said.contains("--cell 16 --key-interval 8"), "{before} {said}");
     }
 
     #[test]

@@ -26,9 +26,13 @@ impl Made {
         Ok(Self { settings, encoded, quality })
     }
 
-    /// Quality less what all but its source image takes, dB, as sparing counts it.
-    pub fn worth(&self, flat: &Flat) -> f64 {
-        let picture = image_bytes(&flat.atlas.image, self.settings.atlas.storage);
+    /// Bytes of its source image, made of `flat`. A packed one is packed to tell.
+    pub fn picture(&self, flat: &Flat) -> usize {
+        image_bytes(&flat.atlas.image, self.settings.atlas.storage)
+    }
+
+    /// Quality less what all but its source image of `picture` bytes takes, dB, as sparing counts it.
+    pub fn worth(&self, picture: usize) -> f64 {
         metrics::worth(self.quality.psnr_mean, self.encoded.bundle.len().saturating_sub(picture) as u64, DOUBLE)
     }
 

@@ -50,7 +50,8 @@ pub(crate) fn choose(scene: &Scene, flat: &Flat, curved: Made, progress: Progres
     let straight = Made::new(scene, flat, Settings { space: SPACE_LINEAR, ..curved.settings })?;
     progress("trying straight space", 1.0);
     let trials = vec![Trial::new(&curved)?, Trial::new(&straight)?];
-    let gained = curved.worth(flat) - straight.worth(flat);
+    let picture = curved.picture(flat);
+    let gained = curved.worth(picture) - straight.worth(picture);
     Ok((if gained > GAIN { curved } else { straight }, trials))
 }
 

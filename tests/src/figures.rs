@@ -4,8 +4,7 @@
 use crate::play;
 use anyhow::Result;
 use cubist_baker::atlas::{Atlas, Label};
-use cubist_core::{Bundle, Player};
-use std::time::Instant;
+use cubist_core::Bundle;
 
 /// A bundle played against exact ray casting of every pixel through the same source image.
 #[derive(Clone, Copy, Debug, Default)]
@@ -82,19 +81,4 @@ pub fn psnr(squares: u64, values: usize) -> f64 {
 pub fn key_bytes_per_frame(bytes: &[u8]) -> Result<f64> {
     let bundle = Bundle::parse(bytes)?;
     Ok(bundle.path().key_bytes() as f64 / f64::from(bundle.frames()))
-}
-
-/// Frames a second of the host playing every frame once, in order.
-///
-/// # Errors
-/// The bundle does not parse.
-pub fn speed(bytes: &[u8], frames: u32) -> Result<f64> {
-    let mut row = vec![0u16; 4096];
-    let start = Instant::now();
-    play::visit(bytes, 0..frames, |_, player: &mut Player<'_>| {
-        for y in 0..player.bundle().size().1 {
-            player.row(y, &mut row);
-        }
-    })?;
-    Ok(f64::from(frames) / start.elapsed().as_secs_f64().max(1e-9))
 }

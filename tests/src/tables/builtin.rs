@@ -1,12 +1,11 @@
 //! The table of scenes: what each costs and how well it plays, at its own playback, as `cubist-bake` bakes it without options.
-//! Scenes come from the command `table`, figures from `figures`; the table goes back.
+//! Scenes come from the command `table`, figures from the baker's report; the table goes back.
 
 use super::{Table, markdown, number};
-use crate::figures;
 use anyhow::{Context, Result, bail};
-use cubist_baker::TruthFrames;
 use cubist_baker::job::{self, Baked, Options};
 use cubist_baker::scene::Scene;
+use cubist_baker::{Report, TruthFrames};
 use cubist_core::Bundle;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -37,30 +36,29 @@ const COLUMNS: [(&str, &str, usize); 15] = [
 pub fn measure(scene: &Scene) -> Result<Value> {
     eprintln!("{}: baking", scene.name);
     let options = Options { truth: TruthFrames::None, ..Options::default() };
-    let Baked { bundle: bytes, report, flat } = job::run(scene, &options, &|_, _| {}).with_context(|| format!("bake {}", scene.name))?;
-    eprintln!("{}: playing", scene.name);
-    let bundle = Bundle::parse(&bytes).with_context(|| format!("parse the bundle of {}", scene.name))?;
-    let quality = figures::quality(&bytes, &flat.atlas)?;
+    let Baked { bundle, report, .. } = job::run(scene, &options, &|_, _| {}).with_context(|| format!("bake {}", scene.name))?;
+    let bundle = Bundle::parse(&bundle).with_context(|| format!("parse the bundle of {}", scene.name))?;
     let atlas = bundle.atlas();
+    let Report { grid, quality, work, .. } = &report;
     Ok(json!({
-        "scene": scene.name,
-        "size": [bundle.size().0, bundle.size().1],
-        "frames": bundle.frames(),
-        "triangles": scene.triangles.len(),
+        "scene": report.scene,
+        "size": report.size,
+        "frames": report.frames,
+        "triangles": report.triangles,
         "labels": bundle.label_count(),
-        "bundle_bytes": bytes.len(),
+        "bundle_bytes": report.bytes.bundle,
         "atlas_bytes": atlas.texels.len() + atlas.palette.len(),
-        "key_bytes_per_frame": figures::key_bytes_per_frame(&bytes)?,
-        "bytes_per_frame": bytes.len() as f64 / f64::from(bundle.frames()),
+        "key_bytes_per_frame": report.bytes.keys_per_frame,
+        "bytes_per_frame": report.bytes.per_frame,
         "psnr_mean": quality.psnr_mean,
         "psnr_min": quality.psnr_min,
         "wrong_surface_percent": quality.wrong_surface_percent,
-        "torn_percent": quality.torn_percent,
-        "memory_bytes": bundle.memory_needed(),
+        "torn_percent": work.torn_percent,
+        "memory_bytes": report.memory.workspace,
         "bake_seconds": report.seconds.total,
-        "cell": report.grid.cell,
-        "space": report.grid.space,
-        "host_frames_per_second": figures::speed(&bytes, bundle.frames())?,
+        "cell": grid.cell,
+        "space": grid.space,
+        "host_frames_per_second": work.host_frames_per_second,
     }))
 }
 
