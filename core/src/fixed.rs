@@ -85,26 +85,49 @@ pub const fn middle(before: Option<i32>, from: i32, to: i32, after: Option<i32>)
 /// The largest size of a field code, which stands for 128 pixels.
 pub const MAX_FIELD: i32 = 37;
 
-/// The distance that field code `code` stands for, Q8 pixels: four steps an octave from 1/4 pixel, with a sign; 0 is 0.
-#[must_use]
-pub fn field_distance(code: i8) -> i32 {
-    // 64 * 2^(i / 4).
-    const STEPS: [i32; 4] = [64, 76, 91, 108];
-    let size = u32::from(code.unsigned_abs()).min(MAX_FIELD as u32);
-    let Some(index) = size.checked_sub(1) else { return 0 };
-    let distance = STEPS.get(index as usize & 3).copied().unwrap_or(0).wrapping_shl(index >> 2);
+/// What the field codes from -[`MAX_FIELD`] to [`MAX_FIELD`] stand for.
+static DISTANCES: [i32; 2 * MAX_FIELD as usize + 1] = {
+    let mut distances = [0; _];
+    let mut rest = distances.as_mut_slice();
+    let mut code = -MAX_FIELD;
+    while let Some((slot, more)) = rest.split_first_mut() {
+        *slot = distance(code);
+        (code, rest) = (code.wrapping_add(1), more);
+    }
+    distances
+};
+
+/// 64 * 2^(i / 4) of code i + 1, negative of negative ones.
+const fn distance(code: i32) -> i32 {
+    let Some(index) = code.unsigned_abs().checked_sub(1) else { return 0 };
+    let step: i32 = match index & 3 {
+        0 => 64,
+        1 => 76,
+        2 => 91,
+        _ => 108,
+    };
+    let distance = step.wrapping_shl(index >> 2);
     if code < 0 { distance.wrapping_neg() } else { distance }
+}
+
+/// The distance that field code `code` stands for, Q8 pixels: four steps an octave from 1/4 pixel, with a sign; 0 is 0, and so is what is no code.
+#[must_use]
+#[inline(always)]
+pub fn field_distance(code: i8) -> i32 {
+    let place = i32::from(code).wrapping_add(MAX_FIELD) as usize;
+    DISTANCES.get(place).copied().unwrap_or(0)
 }
 
 /// The field code closest to `distance`, Q8 pixels.
 #[must_use]
 pub fn field_code(distance: i32) -> i8 {
-    let size = distance.unsigned_abs().min(1 << 20) as i32;
-    let mut code = 0i8;
+    let size = distance.unsigned_abs().min(1 << 20);
+    // An octave has four codes: those below the distance's own are too small.
+    let mut code = size.checked_ilog2().map_or(0, |log2| log2.saturating_sub(6).wrapping_mul(4)).min(MAX_FIELD as u32) as i8;
     // The codes' distances grow: stop at the first whose midpoint to the next is not passed.
     while i32::from(code) < MAX_FIELD {
         let (low, high) = (field_distance(code), field_distance(code.wrapping_add(1)));
-        if size.wrapping_mul(2) < low.wrapping_add(high) {
+        if (size as i32).wrapping_mul(2) < low.wrapping_add(high) {
             break;
         }
         code = code.wrapping_add(1);
@@ -123,6 +146,11 @@ mod tests {
         }
         assert_eq!(field_distance(37), 128 << 8);
         assert_eq!((field_code(1 << 30), field_code(-(1 << 30)), field_code(20)), (37, -37, 0));
+        assert_eq!((field_distance(38), field_distance(-128)), (0, 0));
+        for distance in 0..40_000 {
+            let closest = (0..37).find(|&code| 2 * distance < field_distance(code) + field_distance(code + 1)).unwrap_or(37);
+            assert_eq!((field_code(distance), field_code(-distance)), (closest, -closest), "{distance}");
+        }
     }
 
     #[test]

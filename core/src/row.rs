@@ -57,7 +57,7 @@ pub struct Around<'k, 'm> {
 }
 
 /// The field between those that two codes stand for, Q8 pixels.
-#[inline(never)]
+#[inline(always)]
 fn mix(from: i8, to: i8, linear: i32) -> i16 {
     // Distances are at most 2^15 and weights 2^14: the sums fit.
     let (from, to) = (field_distance(from), field_distance(to));
