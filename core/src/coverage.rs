@@ -75,7 +75,7 @@ impl Chart {
     // Without what lies around them: one position mostly tells that not all are beyond an edge.
     #[must_use]
     #[inline(always)]
-    pub fn cover(&self, [[a, b], [c, d]]: [[PlayUv; 2]; 2]) -> Cover {
+    pub fn cover(&self, [[a, b], [c, d]]: [[PlayUv; 2]; 2], texture: &Texture<'_>) -> Cover {
         let (left, right) = (self.left.wrapping_sub(SLACK), self.right.wrapping_add(SLACK));
         let (top, bottom) = (self.top.wrapping_sub(SLACK), self.bottom.wrapping_add(SLACK));
         if a.u < left && b.u < left && c.u < left && d.u < left
@@ -89,7 +89,8 @@ impl Chart {
         let (left, right) = (left.wrapping_add(TWICE), right.wrapping_sub(TWICE));
         let (top, bottom) = (top.wrapping_add(TWICE), bottom.wrapping_sub(TWICE));
         let inside = |uv: PlayUv| uv.u >= left && uv.u < right && uv.v >= top && uv.v < bottom;
-        if !self.masked() && inside(a) && inside(b) && inside(c) && inside(d) { Cover::All } else { Cover::Part }
+        let all = inside(a) && inside(b) && inside(c) && inside(d);
+        if all && (!self.masked() || texture.filled(&Bounds::around(&[a, b, c, d]).wider(SLACK))) { Cover::All } else { Cover::Part }
     }
 
     /// Passes those of the rectangle's edges on that what lies between the corners of a block, within `bounds`, may cross.
@@ -137,6 +138,15 @@ impl Bounds {
     #[inline(always)]
     pub fn join(self, other: Self) -> Self {
         Self { low: Self::of(self.low, other.low).low, high: Self::of(self.high, other.high).high }
+    }
+
+    /// By so much more, every way.
+    #[must_use]
+    #[inline(always)]
+    const fn wider(self, by: i32) -> Self {
+        let Self { low, high } = self;
+        let by = PlayUv { u: by, v: by };
+        Self { low: low.less(by), high: high.plus(by) }
     }
 
     /// Around a block's corners.

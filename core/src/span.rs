@@ -244,25 +244,25 @@ pub fn near(beyond: [i32; 4], row: u32, log2: u32) -> u32 {
     negative(from, step, 1 << log2)
 }
 
-/// Those of the pixels that `shown` names, of a span of `pixels`, whose texels the mask has.
+/// Those of the pixels that `shown` names whose texels the mask has.
 #[inline(always)]
 #[must_use]
-pub fn covered(mut shown: u32, pixels: usize, span: Span, texture: &Texture<'_>) -> u32 {
-    let mut uv = span.from;
-    for pixel in 0..pixels as u32 {
-        if shown.wrapping_shr(pixel) & 1 != 0 && !texture.covered(uv) {
-            shown &= !1u32.wrapping_shl(pixel);
+pub fn covered(shown: u32, span: Span, texture: &Texture<'_>) -> u32 {
+    let (mut uv, mut rest, mut bit, mut covered) = (span.from, shown, 1u32, 0u32);
+    while rest != 0 {
+        if rest & 1 != 0 && texture.covered(uv) {
+            covered |= bit;
         }
-        uv = uv.plus(span.step);
+        (rest, bit, uv) = (rest >> 1, bit.wrapping_shl(1), uv.plus(span.step));
     }
-    shown
+    covered
 }
 
 /// Those of the pixels that `shown` names, of a span of `pixels`, at which the span lies inside `chart`.
 #[inline(always)]
 #[must_use]
 pub fn inside(chart: &Chart, mut shown: u32, pixels: usize, span: Span, texture: &Texture<'_>) -> u32 {
-    match chart.cover([[span.from, span.at(pixels.wrapping_sub(1))]; 2]) {
+    match chart.cover([[span.from, span.at(pixels.wrapping_sub(1))]; 2], texture) {
         Cover::Nothing => return 0,
         Cover::All => return shown,
         Cover::Part => {}

@@ -139,8 +139,10 @@ impl Mixed {
                         shown = if upper { shown.and(near) } else { shown.and_not(near) };
                     });
                     if chart.masked() && shown != Shown::NONE {
-                        let covered = |row: u32| span::covered(shown.row(row), 1 << log2, Span::new(corners, row, log2), &site.texture);
-                        shown = Shown::rows(log2, covered);
+                        shown = Shown::rows(log2, |row| match shown.row(row) {
+                            0 => 0,
+                            shown => span::covered(shown, Span::new(corners, row, log2), &site.texture),
+                        });
                     }
                 }
                 if shown == Shown::NONE {
@@ -199,10 +201,10 @@ pub fn candidates(site: &Site<'_, '_, '_>, strip: u32, sheets: &[Sheet]) -> [u16
         if sheet.test() != FIELD && (asked || asked_right) {
             let [a, b, c] = block.verticals(sheet);
             if asked {
-                on_left = on_left.and(chart.cover([a, b]));
+                on_left = on_left.and(chart.cover([a, b], &site.texture));
             }
             if asked_right {
-                on_right = on_right.and(chart.cover([b, c]));
+                on_right = on_right.and(chart.cover([b, c], &site.texture));
             }
         }
         left.see(bit, on_left);
