@@ -112,7 +112,7 @@ impl Plan<'_> {
             let most = (width.saturating_sub(across.left) >> 3).min(cells.wrapping_sub(along).into());
             if most > 0
                 && let Some(room) = &room
-                && (room.window == Window::USUAL || room.window == Window::NARROW && site.cubic())
+                && (room.window == Window::USUAL || room.window == Window::NARROW)
                 && site.bundle.grid().log2 == 3
             {
                 let rest = lines.map(|line| line.get(usize::from(along).wrapping_mul(across.blocks() as usize)..).unwrap_or(&[]));
@@ -120,7 +120,8 @@ impl Plan<'_> {
                 let extend = |plan: &mut Self| match (site.cubic(), room.window == Window::USUAL) {
                     (true, true) => plan.extend::<9, 2, 2>(most as usize, room.margin, rest),
                     (true, false) => plan.extend::<8, 2, 2>(most as usize, room.margin, rest),
-                    (false, _) => plan.extend::<9, 1, 3>(most as usize, room.margin, rest),
+                    (false, true) => plan.extend::<9, 1, 3>(most as usize, room.margin, rest),
+                    (false, false) => plan.extend::<8, 1, 3>(most as usize, room.margin, rest),
                 };
                 let mut more = if self.follows(label, block) { extend(self) } else { 0 };
                 if more == 0
