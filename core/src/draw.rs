@@ -116,9 +116,10 @@ impl<'d, 'a> Drawing<'d, 'a> {
         let drawn = out.len().min(width);
         let out = out.get_mut(..drawn).unwrap_or(&mut []);
         let Plan { tile, run: runs, runs: count, .. } = &*self.plan;
+        let mut colours = None;
         for &run in runs.get(..*count).unwrap_or(&[]) {
             if run.tile == PLAIN {
-                plain(&self.site, run, log2, out, paint);
+                plain(run, log2, out, *colours.get_or_insert_with(|| backdrop(&self.site, paint)));
                 continue;
             }
             let first = usize::from(run.tile);
@@ -241,15 +242,20 @@ fn by_width<P: Paint>(paint: &P, run: Run, tiles: &[Tile], row: u32, out: &mut [
     }
 }
 
-/// A run of the backdrop's one colour.
+/// The backdrop's one colour, at even and odd pixels of a row.
 #[inline(never)]
-fn plain<P: Paint>(site: &Site<'_, '_, '_>, run: Run, log2: u32, out: &mut [P::Pixel], paint: &P) {
-    let [from, to] = [run.place, run.place.wrapping_add(run.count)].map(|tile| usize::from(tile).wrapping_shl(log2).min(out.len()));
-    let Some((record, pixels)) = site.backdrop.zip(out.get_mut(from..to)) else { return };
+fn backdrop<P: Paint>(site: &Site<'_, '_, '_>, paint: &P) -> [P::Pixel; 2] {
+    let Some(record) = site.backdrop else { return [P::Pixel::default(); 2] };
     let uv = key::backdrop(record, [0; 2], 0, site.bundle.path().key_bits.into());
     let uv = site.texture.clamp(uv);
-    // Tiles begin at even pixels.
-    let [even, odd] = [0, 1].map(|x| paint.at(uv, BACKDROP as u8, x));
+    [0, 1].map(|x| paint.at(uv, BACKDROP as u8, x))
+}
+
+/// A run of one colour; tiles begin at even pixels.
+#[inline(never)]
+fn plain<T: Copy>(run: Run, log2: u32, out: &mut [T], [even, odd]: [T; 2]) {
+    let [from, to] = [run.place, run.place.wrapping_add(run.count)].map(|tile| usize::from(tile).wrapping_shl(log2).min(out.len()));
+    let Some(pixels) = out.get_mut(from..to) else { return };
     let (eights, rest) = pixels.as_chunks_mut();
     for eight in eights {
         *eight = [even, odd, even, odd, even, odd, even, odd];
