@@ -103,7 +103,8 @@ impl RowSheets<'_> {
         let mut count = 0usize;
         let mut column = 0usize;
         self.stretches = 0;
-        self.found.fill(Found::default());
+        // Nothing is known of any column.
+        self.found.iter_mut().for_each(|found| found.end = 0);
         for stretch in self.stretch.iter_mut() {
             let Some(left) = grid.columns.checked_sub(column).filter(|&left| left > 0) else { break };
             let listed = lists.sheets(cursor);
