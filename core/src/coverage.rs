@@ -33,10 +33,14 @@ impl Cover {
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Chart {
-    left: i32,
-    top: i32,
-    right: i32,
-    bottom: i32,
+    /// Q16 texels.
+    pub left: i32,
+    /// Likewise.
+    pub top: i32,
+    /// Exclusive.
+    pub right: i32,
+    /// Exclusive.
+    pub bottom: i32,
     /// The label's.
     flags: u32,
 }

@@ -220,7 +220,7 @@ impl Field {
     }
 }
 
-/// Which of the next `pixels` pixels, a multiple of four, have a value below zero, from `value` on, `step` more each: a bit each.
+/// Which of the next `pixels` pixels have a value below zero, from `value` on, `step` more each: a bit each.
 #[inline(always)]
 fn negative(mut value: i32, step: i32, pixels: usize) -> u32 {
     // A line: where both ends are of one sign, all of it is. Of four pixels, telling takes as long as they do.
@@ -266,20 +266,22 @@ pub fn covered(shown: u32, span: Span, texture: &Texture<'_>) -> u32 {
 /// Those of the pixels that `shown` names, of a span of `pixels`, at which the span lies inside `chart`.
 #[inline(always)]
 #[must_use]
-pub fn inside(chart: &Chart, mut shown: u32, pixels: usize, span: Span, texture: &Texture<'_>) -> u32 {
+pub fn inside(chart: &Chart, shown: u32, pixels: usize, span: Span, texture: &Texture<'_>) -> u32 {
     match chart.cover([[span.from, span.at(pixels.wrapping_sub(1))]; 2], texture) {
         Cover::Nothing => return 0,
         Cover::All => return shown,
         Cover::Part => {}
     }
-    let mut uv = span.from;
-    for pixel in 0..pixels as u32 {
-        if !chart.covers(uv, texture) {
-            shown &= !1u32.wrapping_shl(pixel);
-        }
-        uv = uv.plus(span.step);
-    }
-    shown
+    let Span { from: PlayUv { u, v }, step } = span;
+    let across = before(u, chart.right, step.u, pixels) & !before(u, chart.left, step.u, pixels);
+    let shown = shown & across & before(v, chart.bottom, step.v, pixels) & !before(v, chart.top, step.v, pixels);
+    if chart.masked() { covered(shown, span, texture) } else { shown }
+}
+
+/// Which of the next `pixels` pixels have a value below `edge`, from `value` on, `step` more each: a bit each.
+#[inline(never)]
+fn before(value: i32, edge: i32, step: i32, pixels: usize) -> u32 {
+    negative(value.wrapping_sub(edge), step, pixels)
 }
 
 #[cfg(test)]
