@@ -114,6 +114,9 @@ pub struct Source {
     pub trials: Vec<Trial>,
     /// Connected regions.
     pub charts: usize,
+    /// Charts that were cut in two because much of the image stayed empty beside them.
+    #[serde(default)]
+    pub halved: usize,
     /// Labels, the background included.
     pub labels: usize,
     /// Share of texels covered, 0..=1.
@@ -222,6 +225,7 @@ impl Report {
                 rewarped: settings.atlas.charts.rewarped,
                 trials: settings.atlas.charts.tried().copied().collect(),
                 charts: figures.charts,
+                halved: figures.halved,
                 labels: figures.labels,
                 fill: figures.fill,
                 density: settings.atlas.density,

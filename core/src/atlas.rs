@@ -1,7 +1,6 @@
 //! The source image at playback: texels by position, and whether a texel belongs to its chart.
 //! Borrowed from the bundle or unpacked by `pack`; read by `coverage`, `filter` and `texels`.
 
-use crate::coverage::Bounds;
 use crate::fixed::{PLAY_BITS, PlayUv};
 
 /// The colour plane and the mask.
@@ -29,23 +28,6 @@ impl Texture<'_> {
     pub fn covered(&self, uv: PlayUv) -> bool {
         let index = self.index(uv);
         self.mask.get(index >> 3).is_some_and(|byte| byte >> (index & 7) & 1 == 1)
-    }
-
-    /// Whether all texels within `bounds`, which lie inside the picture, are known to belong to a chart: not of more than 25 in a row.
-    #[must_use]
-    #[inline(never)]
-    pub fn filled(&self, &Bounds { low, high }: &Bounds) -> bool {
-        let (left, right) = ((low.u >> PLAY_BITS) as u32, (high.u >> PLAY_BITS) as u32);
-        let all = match right.wrapping_sub(left) {
-            more @ ..25 => u32::MAX >> 31u32.wrapping_sub(more),
-            _ => return false,
-        };
-        let mut rows = low.v >> PLAY_BITS..=high.v >> PLAY_BITS;
-        rows.all(|row| {
-            let index = (row as u32).wrapping_shl(self.width_log2) | left;
-            let bits = self.mask.get((index >> 3) as usize..).and_then(<[u8]>::first_chunk).copied();
-            bits.is_some_and(|bytes| !u32::from_le_bytes(bytes) >> (index & 7) & all == 0)
-        })
     }
 
     /// Whether `uv` lies inside the picture.

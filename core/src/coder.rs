@@ -163,20 +163,21 @@ mod tests {
 
     #[test]
     fn whatever_comes_probabilities_keep_away_from_certainty() {
+        // By state, whether it can be reached.
         let mut reached = [false; 1 << 16];
-        reached[usize::from(Probability::NEW.0)] = true;
-        let mut more = true;
-        while more {
-            more = false;
+        let mark = |state: u16, reached: &mut [bool]| reached.get_mut(usize::from(state)).map(|slot| !core::mem::replace(slot, true));
+        let mut more = mark(Probability::NEW.0, &mut reached);
+        while more == Some(true) {
+            more = Some(false);
             for state in 0..=u16::MAX {
-                if !reached[usize::from(state)] {
+                if reached.get(usize::from(state)) != Some(&true) {
                     continue;
                 }
                 assert!((32..=4064).contains(&Probability(state).zero()), "{state:x}");
                 for bit in [false, true] {
                     let mut to = Probability(state);
                     to.learn(bit);
-                    more |= !core::mem::replace(&mut reached[usize::from(to.0)], true);
+                    more = more.max(mark(to.0, &mut reached));
                 }
             }
         }

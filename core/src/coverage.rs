@@ -94,7 +94,7 @@ impl Chart {
         let (top, bottom) = (top.wrapping_add(TWICE), bottom.wrapping_sub(TWICE));
         let inside = |uv: PlayUv| uv.u >= left && uv.u < right && uv.v >= top && uv.v < bottom;
         let all = inside(a) && inside(b) && inside(c) && inside(d);
-        if all && (!self.masked() || texture.filled(&Bounds::around(&[a, b, c, d]).wider(SLACK))) { Cover::All } else { Cover::Part }
+        if all && (!self.masked() || filled(texture, &Bounds::around(&[a, b, c, d]).wider(SLACK))) { Cover::All } else { Cover::Part }
     }
 
     /// Passes those of the rectangle's edges on that what lies between the corners of a block, within `bounds`, may cross.
@@ -115,6 +115,22 @@ impl Chart {
             pass(Edge::new(down, self.bottom, true));
         }
     }
+}
+
+/// Whether all texels within `bounds`, which lie inside the picture, are known to belong to a chart: not of more than 25 in a row.
+#[inline(never)]
+fn filled(texture: &Texture<'_>, &Bounds { low, high }: &Bounds) -> bool {
+    let (left, right) = ((low.u >> PLAY_BITS) as u32, (high.u >> PLAY_BITS) as u32);
+    let all = match right.wrapping_sub(left) {
+        more @ ..25 => u32::MAX >> 31u32.wrapping_sub(more),
+        _ => return false,
+    };
+    let mut rows = low.v >> PLAY_BITS..=high.v >> PLAY_BITS;
+    rows.all(|row| {
+        let index = (row as u32).wrapping_shl(texture.width_log2) | left;
+        let bits = texture.mask.get((index >> 3) as usize..).and_then(<[u8]>::first_chunk).copied();
+        bits.is_some_and(|bytes| !u32::from_le_bytes(bytes) >> (index & 7) & all == 0)
+    })
 }
 
 /// An upright rectangle of the source image.

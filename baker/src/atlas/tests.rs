@@ -323,6 +323,35 @@ fn charts_are_packed_tightly() {
     assert!(atlas.figures.fill > 0.4, "{:?}", atlas.figures);
 }
 
+/// A narrow band along two sides of a square floor: most of the rectangle around it is empty.
+fn corner() -> Scene {
+    let square = |i: u32, across: bool| {
+        let (far, near) = (-1.6 + 0.2 * f64::from(i), -1.4 + 0.2 * f64::from(i));
+        let at = |along: f64, beside: f64| if across { DVec3::new(along, 0.0, beside) } else { DVec3::new(beside, 0.0, along) };
+        let [a, b, c, d] = [at(far, -1.6), at(far, -1.4), at(near, -1.4), at(near, -1.6)];
+        quad(if across { [a, b, c, d] } else { [d, c, b, a] })
+    };
+    let squares = (0..16).flat_map(|i| [(i, true), (i, false)]).filter(|&(i, across)| across || i > 0);
+    scene(squares.flat_map(|(i, across)| square(i, across)).collect(), vec![], Material::default())
+}
+
+#[test]
+fn a_bent_chart_is_cut_where_texels_are_raw() {
+    let scene = corner();
+    let hits = hits(&scene);
+    let [raw, packed] = [Storage::Raw, Storage::Packed].map(|storage| {
+        let settings = Settings { storage, density: 2.0, charts: Family::Planes.into(), ..Settings::default() };
+        build(&scene, &hits, &settings, &|_, _| {}).expect("it fits")
+    });
+    let texels = |atlas: &Atlas| atlas.image.width * atlas.image.height;
+    assert_eq!((packed.figures.charts, packed.figures.halved), (1, 0));
+    assert_eq!(raw.figures.charts, 1 + raw.figures.halved);
+    assert!(raw.figures.halved > 0 && 10 * texels(&raw) < 9 * texels(&packed), "{} of {} texels", texels(&raw), texels(&packed));
+    // What is seen is where it is covered, whatever it was cut from.
+    assert!(seen(&hits, &raw).all(|(_, _, uv)| raw.image.covered[texel(&raw.image, uv)]));
+    assert!(psnr(&scene, &hits, &raw) > psnr(&scene, &hits, &packed) - 0.5);
+}
+
 #[test]
 fn threads_do_not_matter() {
     let scene = hill();

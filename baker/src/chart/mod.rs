@@ -26,6 +26,7 @@ use view::View;
 pub use family::{Choice, Family, Trial, reason};
 pub use labels::assign;
 pub(crate) use observe::Faces;
+pub(crate) use price::price;
 pub(crate) use unwrapped::Islands;
 pub use unwrapped::NoIslands;
 pub(crate) use warp::rewarp;
@@ -62,6 +63,12 @@ pub struct Chart {
     pub hi: [f64; 2],
     /// Pixels, over all frames, that see the chart.
     pub hits: u64,
+}
+
+/// The charts before one of them was cut.
+pub(crate) struct Uncut {
+    chart_of: Vec<u32>,
+    charts: Vec<Chart>,
 }
 
 /// All charts of a scene.
@@ -102,6 +109,31 @@ impl Charting {
         let [p, q, r] = self.corners[face].map(|corner| corner[3]);
         let (a, b, c) = ((1.0 - b - c) / p, b / q, c / r);
         [b / (a + b + c), c / (a + b + c)]
+    }
+
+    /// Cuts chart `chart` in two along a line across one of its flattened coordinates, where that one has this value: faces go to the side that their
+    /// middles lie on. Returns what was before; `None`, and nothing is done, where one side would have none.
+    pub(crate) fn sever(&mut self, hits: &Hits, chart: usize, (axis, value): (usize, f64)) -> Option<Uncut> {
+        let beyond = |corners: &[[f64; 4]; 3]| corners.iter().map(|corner| corner[axis] / corner[3]).sum::<f64>() >= 3.0 * value;
+        let sides = || self.chart_of.iter().zip(&self.corners).filter(|(of, _)| **of == chart as u32).map(|(_, corners)| beyond(corners));
+        if sides().all(|side| side) || !sides().any(|side| side) {
+            return None;
+        }
+        let uncut = Uncut { chart_of: self.chart_of.clone(), charts: self.charts.clone() };
+        let other = self.charts.len() as u32;
+        self.charts.push(self.charts[chart].clone());
+        for (of, corners) in self.chart_of.iter_mut().zip(&self.corners) {
+            if *of == chart as u32 && beyond(corners) {
+                *of = other;
+            }
+        }
+        measure::bound(hits, self);
+        Some(uncut)
+    }
+
+    /// Takes back a cut.
+    pub(crate) fn mend(&mut self, Uncut { chart_of, charts }: Uncut) {
+        (self.chart_of, self.charts) = (chart_of, charts);
     }
 
     /// The mean distance of each cluster from its view's eye.

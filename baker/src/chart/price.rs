@@ -17,7 +17,7 @@ const FLAT: f64 = 0.5;
 const BYTES: [f64; 4] = [0.1, 2.0, 0.7, 5.0];
 
 /// Bytes of keys that the charts are likely to take: those of blocks of 8 x 8 pixels and 8 frames, more where they are not flat and where they share the block.
-pub(super) fn price(hits: &Hits, charting: &Charting) -> f64 {
+pub(crate) fn price(hits: &Hits, charting: &Charting) -> f64 {
     let bent = bent(charting);
     let (width, height) = (hits.width as usize, hits.height as usize);
     let (across, frame_size) = (width.div_ceil(BLOCK), (width * height).max(1));
