@@ -129,7 +129,8 @@ mod tests {
     #[test]
     fn rough_land_gets_larger_cells() {
         // Keys so far apart that no curve through them follows the hills.
-        let settings = Settings { cell: 8, key_interval: 16, ..Settings::default() };
+        let atlas = crate::atlas::Settings { storage: crate::atlas::Storage::Packed, ..Default::default() };
+        let settings = Settings { cell: 8, key_interval: 16, atlas, ..Settings::default() };
         let (scene, flat, usual) = made("terrain", [96, 72], 65, settings);
         let picture = usual.picture(&flat);
         let (before, told) = (usual.worth(picture), usual.told());
