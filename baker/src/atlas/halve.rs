@@ -3,10 +3,12 @@
 
 use super::footprint::Footprints;
 use super::mask::{Mask, Run};
-use super::pack::{self, Layout};
-use crate::chart::{self, Chart, Charting};
+use super::pack::Layout;
+use super::place::Place;
+use crate::chart::{self, Chart, Charting, Parts};
 use crate::gbuffer::Hits;
 use crate::scene::Scene;
+use cubist_core::format::TexelKind;
 use std::cmp::Reverse;
 
 /// An image filled like this is left alone.
@@ -19,72 +21,67 @@ const TRIED: usize = 3;
 const SHORT: u32 = 24;
 /// The part of a chart's length that each half keeps at least.
 const LEAST: f64 = 0.25;
-/// A texel's bytes, its bit of the mask counted in.
-const TEXEL: f64 = 1.125;
 /// What keys are told to cost more, they have to save so many times: a seam costs quality and time, too.
 const WORTH: f64 = 3.0;
 /// Nothing is cut for less than this share of the image: every cut takes memory of the player, too.
 const SOME: f64 = 0.1;
 
-/// What became of the charts.
-pub(super) struct Halved {
-    /// How they are packed.
-    pub layout: Layout,
-    /// How many were cut.
-    pub cuts: usize,
-}
-
-/// Packs the charts for an image of raw texels, and cuts some of them in two while that pays; `None` where they do not fit.
-pub(super) fn halve(scene: &Scene, hits: &Hits, charting: &mut Charting, backdrop: [u32; 2], max_side: u32) -> Option<Halved> {
-    let packed = |charting: &Charting| pack::pack(&Footprints::new(scene, hits, charting), backdrop, max_side);
-    let mut halved = Halved { layout: packed(charting)?, cuts: 0 };
-    let mut price = None;
-    while halved.cuts < CUTS {
-        let masks = Footprints::new(scene, hits, charting).drawn(&pack::sizes(charting, 1.0, max_side), 1.0);
-        let (whole, area) = (texels(&halved.layout), masks.iter().map(Mask::area).sum::<u32>());
-        // Where not all the density fits, room is short for another reason.
-        if halved.layout.scale < 1.0 || f64::from(area) >= FULL * whole {
+/// Cuts some of the charts in two while that pays in an image of raw texels of `kind`; how many. `pack` lays charts out.
+pub(super) fn halve(
+    scene: &Scene,
+    hits: &Hits,
+    charting: &mut Charting,
+    kind: TexelKind,
+    pack: impl Fn(&Charting) -> Option<Layout>,
+) -> usize {
+    let (mut packed, mut cuts) = (pack(charting), 0);
+    // Where not all the density fits, room is short for another reason.
+    while let Some(layout) = packed.filter(|layout| layout.scale >= 1.0 && cuts < CUTS) {
+        let whole = layout.width * layout.height;
+        let sizes: Vec<[u32; 2]> = layout.places.iter().map(Place::size).collect();
+        let masks = Footprints::new(scene, hits, charting).drawn(&sizes, layout.scale);
+        let area: u32 = masks.iter().map(Mask::area).sum();
+        if f64::from(area) >= FULL * f64::from(whole) {
             break;
         }
-        let before = *price.get_or_insert_with(|| chart::price(hits, charting));
-        let side = |chart: usize| masks[chart].width.max(masks[chart].height);
-        let mut longest: Vec<usize> = (0..masks.len()).filter(|&chart| side(chart) >= SHORT).collect();
-        longest.sort_by_key(|&chart| (Reverse(side(chart)), chart));
+        let keys = chart::price(hits, charting);
         let mut best: Option<Cut> = None;
-        for chart in longest.into_iter().take(TRIED) {
+        for chart in longest(&masks) {
             let Some(line) = thinnest(&masks[chart], &charting.charts[chart]) else { continue };
-            let Some(uncut) = charting.sever(hits, chart, line) else { continue };
-            if let Some(layout) = packed(charting).filter(|layout| layout.scale >= 1.0) {
-                let (keys, texels) = (chart::price(hits, charting), texels(&layout));
-                let gain = TEXEL * (whole - texels) - WORTH * (keys - before);
-                if texels < (1.0 - SOME) * whole && gain > best.as_ref().map_or(0.0, |best| best.gain) {
-                    best = Some(Cut { gain, chart, line, keys, layout });
-                }
+            let Some(before) = charting.sever(hits, chart, line) else { continue };
+            let told = chart::price(hits, charting);
+            let layout = pack(charting).filter(|layout| layout.scale >= 1.0);
+            let cut = charting.exchange(before);
+            let Some(layout) = layout else { continue };
+            let saved = whole.saturating_sub(layout.width * layout.height);
+            // A texel's bit of the mask counts, too.
+            let bytes = kind.bytes(saved as usize) as f64 + f64::from(saved) / 8.0;
+            let gain = bytes - WORTH * (told - keys);
+            if f64::from(saved) > SOME * f64::from(whole) && gain > best.as_ref().map_or(0.0, |best| best.gain) {
+                best = Some(Cut { gain, cut, layout });
             }
-            charting.mend(uncut);
         }
-        let Some(Cut { chart, line, keys, layout, .. }) = best else { break };
-        charting.sever(hits, chart, line)?;
-        price = Some(keys);
-        halved = Halved { layout, cuts: halved.cuts + 1 };
+        let Some(Cut { cut, layout, .. }) = best else { break };
+        charting.exchange(cut);
+        (packed, cuts) = (Some(layout), cuts + 1);
     }
-    Some(halved)
+    cuts
 }
 
 /// A cut that pays.
 struct Cut {
     /// Bytes that it saves, what keys take weighed.
     gain: f64,
-    chart: usize,
-    /// See [`Charting::sever`].
-    line: (usize, f64),
-    /// What keys are told to take then, bytes.
-    keys: f64,
+    cut: Parts,
     layout: Layout,
 }
 
-fn texels(layout: &Layout) -> f64 {
-    f64::from(layout.width) * f64::from(layout.height)
+/// The charts to try, those whose rectangles are longest first.
+fn longest(masks: &[Mask]) -> impl Iterator<Item = usize> + use<> {
+    let side = |chart: usize| masks[chart].width.max(masks[chart].height);
+    let mut longest: Vec<usize> = (0..masks.len()).filter(|&chart| side(chart) >= SHORT).collect();
+    longest.sort_by_key(|&chart| (Reverse(side(chart)), chart));
+    longest.into_iter().take(TRIED)
 }
 
 /// Where a chart is thinnest across the longer side of its rectangle: the flattened coordinate along that, and what it is there.

@@ -186,12 +186,12 @@ pub fn build(scene: &Scene, hits: &Hits, settings: &Settings, progress: &(dyn Fn
     progress(0, 4);
     let mut charting = chart::build(scene, hits, settings.charts.family, settings.density.clamp(0.05, 8.0), settings.max_side);
     let backdrop = backdrop(scene, hits);
-    // Where texels are packed, empty ones take next to nothing.
+    let pack = |charting: &Charting| pack::pack(&footprint::Footprints::new(scene, hits, charting), backdrop, settings.max_side);
     let halved = match settings.storage {
-        Storage::Raw => halve::halve(scene, hits, &mut charting, backdrop, settings.max_side),
-        Storage::Packed => None,
+        Storage::Raw => halve::halve(scene, hits, &mut charting, settings.texels, pack),
+        // Empty texels take next to nothing.
+        Storage::Packed => 0,
     };
-    let cuts = halved.as_ref().map_or(0, |halved| halved.cuts);
     if settings.charts.rewarped {
         chart::rewarp(hits, &mut charting);
     }
@@ -200,11 +200,7 @@ pub fn build(scene: &Scene, hits: &Hits, settings: &Settings, progress: &(dyn Fn
     if labels + 1 > MAX_LABELS {
         return Err(AtlasError::Labels { found: labels + 1 });
     }
-    let layout = halved
-        .filter(|_| !settings.charts.rewarped)
-        .map(|halved| halved.layout)
-        .or_else(|| pack::pack(&footprint::Footprints::new(scene, hits, &charting), backdrop, settings.max_side))
-        .ok_or(AtlasError::Room { charts: charting.charts.len(), side: settings.max_side })?;
+    let layout = pack(&charting).ok_or(AtlasError::Room { charts: charting.charts.len(), side: settings.max_side })?;
     progress(2, 4);
     let fixed = fixed(scene, &layout.backdrop);
     let (gbuffer, seen) = locate(scene, hits, &charting, &layout, &label_of, &fixed);
@@ -217,8 +213,7 @@ pub fn build(scene: &Scene, hits: &Hits, settings: &Settings, progress: &(dyn Fn
     };
     let labels = outline(&charting, &layout, &label_of, labels, fixed, &filled.covered);
     let fill = filled.covered.iter().filter(|&&c| c).count() as f64 / filled.covered.len().max(1) as f64;
-    let figures =
-        Figures { charts: charting.charts.len(), halved: cuts, labels: labels.len(), fill, scale: layout.scale, gutter: layout.gutter };
+    let figures = Figures { charts: charting.charts.len(), halved, labels: labels.len(), fill, scale: layout.scale, gutter: layout.gutter };
     progress(4, 4);
     let image = SourceImage { width: layout.width, height: layout.height, kind, texels, palette, covered: filled.covered, labels };
     Ok(Atlas { image, gbuffer, figures })

@@ -141,7 +141,7 @@ fn worth([width, height]: [u32; 2]) -> u32 {
 }
 
 /// Sizes of the charts in texels at a scale.
-pub(super) fn sizes(charting: &Charting, scale: f64, most: u32) -> Vec<[u32; 2]> {
+fn sizes(charting: &Charting, scale: f64, most: u32) -> Vec<[u32; 2]> {
     charting.charts.iter().map(|c| [0, 1].map(|k| texels((c.hi[k] - c.lo[k]) * c.density, scale, most))).collect()
 }
 

@@ -48,6 +48,12 @@ impl Place {
         [0, 1].map(|k| (at[k] as f32).clamp(self.rect[k] as f32 + INSIDE, self.rect[k + 2] as f32 - INSIDE))
     }
 
+    /// The chart's size before it was turned, texels.
+    pub fn size(&self) -> [u32; 2] {
+        let [x0, y0, x1, y1] = self.rect;
+        if self.swap { [y1 - y0, x1 - x0] } else { [x1 - x0, y1 - y0] }
+    }
+
     /// Flattened lengths a texel covers, as the side of a square.
     pub fn texel(&self) -> f64 {
         1.0 / (self.step[0] * self.step[1]).abs().sqrt()

@@ -21,6 +21,7 @@ mod warp;
 use crate::gbuffer::Hits;
 use crate::scene::Scene;
 use glam::DVec3;
+use std::mem;
 use view::View;
 
 pub use family::{Choice, Family, Trial, reason};
@@ -65,8 +66,8 @@ pub struct Chart {
     pub hits: u64,
 }
 
-/// The charts before one of them was cut.
-pub(crate) struct Uncut {
+/// How the faces are shared out among charts: what a cut changes.
+pub(crate) struct Parts {
     chart_of: Vec<u32>,
     charts: Vec<Chart>,
 }
@@ -113,13 +114,13 @@ impl Charting {
 
     /// Cuts chart `chart` in two along a line across one of its flattened coordinates, where that one has this value: faces go to the side that their
     /// middles lie on. Returns what was before; `None`, and nothing is done, where one side would have none.
-    pub(crate) fn sever(&mut self, hits: &Hits, chart: usize, (axis, value): (usize, f64)) -> Option<Uncut> {
+    pub(crate) fn sever(&mut self, hits: &Hits, chart: usize, (axis, value): (usize, f64)) -> Option<Parts> {
         let beyond = |corners: &[[f64; 4]; 3]| corners.iter().map(|corner| corner[axis] / corner[3]).sum::<f64>() >= 3.0 * value;
         let sides = || self.chart_of.iter().zip(&self.corners).filter(|(of, _)| **of == chart as u32).map(|(_, corners)| beyond(corners));
         if sides().all(|side| side) || !sides().any(|side| side) {
             return None;
         }
-        let uncut = Uncut { chart_of: self.chart_of.clone(), charts: self.charts.clone() };
+        let before = Parts { chart_of: self.chart_of.clone(), charts: self.charts.clone() };
         let other = self.charts.len() as u32;
         self.charts.push(self.charts[chart].clone());
         for (of, corners) in self.chart_of.iter_mut().zip(&self.corners) {
@@ -128,12 +129,12 @@ impl Charting {
             }
         }
         measure::bound(hits, self);
-        Some(uncut)
+        Some(before)
     }
 
-    /// Takes back a cut.
-    pub(crate) fn mend(&mut self, Uncut { chart_of, charts }: Uncut) {
-        (self.chart_of, self.charts) = (chart_of, charts);
+    /// Shares the faces out like this: takes back a cut, or makes it again. Returns how they were shared out.
+    pub(crate) fn exchange(&mut self, Parts { chart_of, charts }: Parts) -> Parts {
+        Parts { chart_of: mem::replace(&mut self.chart_of, chart_of), charts: mem::replace(&mut self.charts, charts) }
     }
 
     /// The mean distance of each cluster from its view's eye.
