@@ -1,7 +1,7 @@
 //! The choice of charts: each family flattens and codes the scene at half the size, and what costs least in bytes and quality is kept.
 //! Scenes and settings come from `job`, which bakes what is chosen; the report and the bundle say why.
 
-use crate::atlas::{self, Storage};
+use crate::atlas::{self, LONGER, Storage};
 use crate::bake::{self, BakeError, Flat, Progress, Settings, Sparing};
 use crate::chart::{self, Choice, Family, Trial};
 use crate::gbuffer::Hits;
@@ -88,6 +88,8 @@ fn halved(scene: &Scene, settings: &Settings) -> (Scene, Settings) {
         (play.width, play.height) = (play.width / 2, play.height / 2);
     }
     (settings.atlas.storage, settings.sparing) = (Storage::Packed, Sparing::Nothing);
+    // All frames are meant.
+    settings.atlas.detail *= (f64::from(scene.playback.frames) + LONGER) / (f64::from(play.frames) + LONGER);
     (small, settings)
 }
 

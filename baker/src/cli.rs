@@ -96,9 +96,17 @@ pub struct Bake {
     /// Largest side of the source image, texels, 64 to 1024.
     #[arg(long, value_name = "MAX_SIDE", default_value_t = atlas::Settings::default().max_side, value_parser = clap::value_parser!(u32).range(64..=1024))]
     pub atlas: u32,
-    /// Texels a pixel where a surface is seen closest, 0.05 to 8; 0.7 halves the source image.
+    /// Texels a pixel where a surface is seen closest, at most, 0.05 to 8; 0.7 halves the source image.
     #[arg(long, value_name = "RATIO", default_value_t = atlas::Settings::default().density, value_parser = density)]
     pub density: f64,
+    /// What detail is worth, 0.001 to 100 bytes, or all: more keeps more texels, in a larger source image [default: 0.03].
+    ///
+    /// A chart gets fewer texels than --density asks where they take more bytes than what they show is worth: this much for each pixel of each frame
+    /// whose texel is twice as long as the pixel, four times as much for four times as long; a path counts 128 frames more than it has. All keeps
+    /// --density in every chart: bundles of models take half as many bytes again, a room or a street more than twice as many, for up to 0.6 dB.
+    /// A scene that brings a flattening of its own, as built-in ones do, keeps its texels. With --budget the search may keep all, unless this is given.
+    #[arg(long, value_name = "WORTH")]
+    pub detail: Option<Detail>,
     /// What a texel of the source image is, and so what it costs.
     ///
     /// A player names the kinds it plays in its type: Player of Indexed8 (which Player alone means), of Indexed4, of Direct565, or of
@@ -360,6 +368,7 @@ impl Bake {
                 colours: self.colours.map_or(texels.colours(), usize::from),
                 ..atlas::Settings::default()
             },
+            detail: self.detail.map(|Detail(worth)| worth),
             storage: self.storage.map(storage),
             charts: charts.map(Into::into),
             rewarp: match self.rewarp {
@@ -419,6 +428,18 @@ fn ranged(text: &str, range: std::ops::RangeInclusive<f64>, what: &str) -> Resul
 
 fn density(text: &str) -> Result<f64, String> {
     ranged(text, 0.05..=8.0, "texels a pixel")
+}
+
+/// What detail is worth, bytes; infinite: all there is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Detail(pub f64);
+
+impl std::str::FromStr for Detail {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "all" { Ok(Self(f64::INFINITY)) } else { ranged(text, 0.001..=100.0, "all, or bytes").map(Self) }
+    }
 }
 
 /// What a bit of the keys is worth.

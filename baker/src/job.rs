@@ -58,6 +58,8 @@ pub struct Options {
     pub even_keys: bool,
     /// The source image; a search may make it coarser.
     pub source: atlas::Settings,
+    /// What its detail is worth, in place of `source.detail`; `None`: as that says, but a search for a budget may keep all of it.
+    pub detail: Option<f64>,
     /// How the bundle holds it, in place of `source.storage`; `None`: as that says, but a search for a budget may pack it.
     pub storage: Option<Storage>,
     /// How the surface is cut and flattened, in place of `source.charts`; `None`: the baker tries.
@@ -85,6 +87,7 @@ impl Default for Options {
             space: None,
             even_keys: false,
             source: atlas::Settings::default(),
+            detail: None,
             storage: None,
             charts: None,
             rewarp: None,
@@ -119,6 +122,7 @@ impl Options {
     #[must_use]
     pub fn source(&self) -> atlas::Settings {
         atlas::Settings {
+            detail: self.detail.unwrap_or(self.source.detail),
             storage: self.storage.unwrap_or(self.source.storage),
             charts: self.charts.unwrap_or(self.source.charts),
             ..self.source

@@ -123,6 +123,9 @@ pub struct Source {
     pub fill: f64,
     /// Texels a pixel that were asked for where a surface is seen closest.
     pub density: f64,
+    /// What detail was worth, bytes; none: charts have all the density.
+    #[serde(default)]
+    pub detail: Option<f64>,
     /// What densities were multiplied by to make everything fit; at most 1.
     pub scale: f64,
     /// Texels between charts.
@@ -229,6 +232,7 @@ impl Report {
                 labels: figures.labels,
                 fill: figures.fill,
                 density: settings.atlas.density,
+                detail: Some(settings.atlas.detail).filter(|detail| detail.is_finite()),
                 scale: figures.scale,
                 gutter: figures.gutter,
             },

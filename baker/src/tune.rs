@@ -21,8 +21,10 @@ const CELLS: [u32; 2] = [16, 8];
 const INTERVALS: [u32; 4] = [32, 16, 8, 4];
 /// What a bit is worth at first in the search for a budget.
 const BUDGET_LAMBDA: f32 = 0.1;
-/// Densities of the source image tried, of the one asked for.
+/// Densities of the source image tried, of the one asked for; in a search for a budget after that with all its detail, where that is left open.
 const DENSITIES: [f64; 9] = [1.0, 0.85, 0.7, 0.6, 0.5, 0.35, 0.25, 0.18, 0.125];
+/// Source images tried, at most.
+const IMAGES: usize = 1 + DENSITIES.len();
 /// Bundles that fit the budget and are measured, before the best of them is bettered step by step.
 const TRIES: usize = 4;
 /// Steps tried from the best of what was tried at first.
@@ -78,6 +80,11 @@ struct Image {
     packed: Option<usize>,
     /// Mean squared error of exact rays through it against the truth.
     error: f64,
+}
+
+/// What of `source` says how fine the image is.
+fn fineness(source: &atlas::Settings) -> [f64; 2] {
+    [source.density, source.detail]
 }
 
 impl Image {
@@ -151,33 +158,40 @@ impl Search<'_> {
     ///
     /// Source images and grids are measured apart, then the sums of their bytes and of their errors say which pairs to bake.
     fn budget(&self, budget: u64) -> Result<Chosen, BakeError> {
-        let steps = DENSITIES.len() + INTERVALS.len() * CELLS.len() + TRIES + STEPS;
+        let steps = IMAGES + INTERVALS.len() * CELLS.len() + TRIES + STEPS;
         let samples = Samples::new(self.scene);
         let room = usize::try_from(budget).unwrap_or(usize::MAX);
         let mut images: Vec<Image> = Vec::new();
         let mut reference: Option<Flat> = None;
-        let mut asked = self.options.source();
-        for (step, ratio) in DENSITIES.into_iter().enumerate() {
+        let asked = self.options.source();
+        let all = self.options.detail.is_none().then_some((f64::INFINITY, 1.0));
+        let mut scale = 1.0;
+        for (step, (detail, ratio)) in all.into_iter().chain(DENSITIES.map(|ratio| (asked.detail, ratio))).enumerate() {
             self.say(step, steps);
-            let source = atlas::Settings { density: asked.density * ratio, ..asked };
+            let source = atlas::Settings { density: asked.density * scale * ratio, detail, ..asked };
+            let coarsest = ratio == DENSITIES[DENSITIES.len() - 1];
             if let Some(last) = images.last()
+                && last.source.detail == detail
+                && !coarsest
                 && last.least() as f64 * (source.density / last.source.density).powi(2) > 1.5 * room as f64
-                && step + 1 < DENSITIES.len()
             {
                 continue;
             }
             let flat = self.flat(source)?;
-            if step == 0 {
+            if detail == asked.detail && ratio == 1.0 {
                 // Where the image is full, densities above what it holds change nothing.
-                asked.density *= flat.atlas.figures.scale;
+                scale = flat.atlas.figures.scale;
             }
             let packed = self.options.storage.is_none().then(|| image_bytes(&flat.atlas.image, Storage::Packed));
             let bytes = image_bytes(&flat.atlas.image, source.storage);
             let image = Image { source, bytes, packed, error: samples.of_image(&flat.atlas) };
-            if reference.is_none() && (image.least() < room / 10 * 9 || step + 1 == DENSITIES.len()) {
+            if reference.is_none() && (image.least() < room / 10 * 9 || coarsest) {
                 reference = Some(flat);
             }
-            images.push(image);
+            // A flattening of the scene's own has all its detail as it is.
+            if !images.last().is_some_and(|last| (last.bytes, last.error) == (image.bytes, image.error)) {
+                images.push(image);
+            }
         }
         let Some(flat) = reference else { return Err(BakeError::Budget { budget, smallest: u64::MAX }) };
         let keys = self.keys(&flat, &samples, steps)?;
@@ -196,7 +210,7 @@ impl Search<'_> {
         let (image_bytes, image_error) = (image_bytes(&flat.atlas.image, asked.storage), samples.of_image(&flat.atlas));
         let (mut keys, mut exceeded) = (Vec::new(), None);
         for mut settings in self.grids(asked) {
-            self.say(DENSITIES.len() + keys.len(), steps);
+            self.say(IMAGES + keys.len(), steps);
             settings.coding.lambda = BUDGET_LAMBDA;
             let Some(Encoded { bundle, .. }) = possible(self.encode(flat, &settings), &mut exceeded)? else { continue };
             let (error, _) = samples.of_bundle(&bundle)?;
@@ -220,7 +234,7 @@ impl Search<'_> {
 
     /// Bakes the pairs that promise most until enough of them fit, and steps on from the best.
     fn best_pair(&self, budget: u64, pairs: &[(&Image, &Keys)], samples: &Samples, steps: usize) -> Result<Chosen, BakeError> {
-        let mut current: Option<(f64, Flat)> = None;
+        let mut current: Option<([f64; 2], Flat)> = None;
         let mut exceeded = None;
         let mut best: Option<(Settings, f64)> = None;
         let (mut fitting, mut smallest, mut room) = (0, u64::MAX, MOST_MEMORY);
@@ -244,12 +258,12 @@ impl Search<'_> {
             }
             self.say(steps - STEPS - TRIES + fitting, steps);
             let flat = match current.take() {
-                Some((density, flat)) if density == image.source.density => flat,
+                Some((fine, flat)) if fine == fineness(&image.source) => flat,
                 _ => self.flat(image.source)?,
             };
             let settings = Settings { atlas: source, sparing: Sparing::Within(budget), ..keys.settings };
             let found = score(&flat, &settings, true)?;
-            current = Some((image.source.density, flat));
+            current = Some((fineness(&image.source), flat));
             let Some(found) = found else { continue };
             fitting += usize::from(found > 0.0);
             if best.is_none_or(|(_, most)| found > most) {
@@ -258,7 +272,7 @@ impl Search<'_> {
         }
         let Some(start) = best else { return Err(exceeded.unwrap_or(BakeError::Budget { budget, smallest })) };
         let flat = match current {
-            Some((density, flat)) if density == start.0.atlas.density => flat,
+            Some((fine, flat)) if fine == fineness(&start.0.atlas) => flat,
             _ => self.flat(start.0.atlas)?,
         };
         // Coarser coding is what makes a bundle fit.

@@ -96,6 +96,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
     pub fn row<P: Paint>(&mut self, y: u32, out: &mut [P::Pixel], work: &mut Work, paint: &P) {
         let out = self.runs(y, out, work, paint, false);
         match self.site.bundle.texture().width_log2 {
+            7 => self.mix::<P, 7, 7>(y, out, paint),
             8 => self.mix::<P, 8, 6>(y, out, paint),
             9 => self.mix::<P, 9, 6>(y, out, paint),
             _ => self.mix::<P, 10, 4>(y, out, paint),
@@ -236,6 +237,7 @@ fn pixels<T>(block: u16, row: &mut [T], log2: u32) -> Option<&mut [T]> {
 #[inline(always)]
 fn by_width<P: Paint>(paint: &P, run: Run, tiles: &[Tile], row: u32, out: &mut [P::Pixel], log2: u32, width_log2: u32) {
     match width_log2 {
+        7 => paint.run::<7, 7, 0x4000>(run, tiles, row, out, log2),
         8 => paint.run::<8, 6, 0x4000>(run, tiles, row, out, log2),
         9 => paint.run::<9, 6, 0x8000>(run, tiles, row, out, log2),
         _ => paint.run::<10, 4, 0x4000>(run, tiles, row, out, log2),

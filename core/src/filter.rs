@@ -4,6 +4,7 @@
 use crate::atlas::Texture;
 use crate::fixed::{PLAY_BITS, PlayUv};
 use crate::span::Packed;
+use crate::window::fraction;
 
 /// A way of looking texels up. `colour` gives that of a texel, by its index: in the window, or in the whole picture.
 pub trait Filter: Copy {
@@ -76,7 +77,7 @@ impl Filter for Dither {
     #[inline(always)]
     fn offsets(self, width_log2: u32) -> [u32; 2] {
         self.eighths.map(|[u, v]| {
-            let (across, down) = (u.wrapping_shl(29u32.wrapping_sub(width_log2)), v.wrapping_shl(width_log2.wrapping_sub(3)));
+            let (across, down) = (u.wrapping_shl(29u32.wrapping_sub(width_log2)), v.wrapping_shl(fraction(width_log2).wrapping_sub(3)));
             across.wrapping_add(down) as u32
         })
     }
@@ -127,14 +128,14 @@ impl<const SWAPPED: bool> Filter for Bilinear<SWAPPED> {
     #[inline(always)]
     fn offsets(self, width_log2: u32) -> [u32; 2] {
         // From centre to centre; the window has room for half a texel all around.
-        let half = 1u32.wrapping_shl(31u32.wrapping_sub(width_log2)).wrapping_add(1u32.wrapping_shl(width_log2.wrapping_sub(1)));
+        let half = 1u32.wrapping_shl(31u32.wrapping_sub(width_log2)).wrapping_add(1u32.wrapping_shl(fraction(width_log2).wrapping_sub(1)));
         [half.wrapping_neg(); 2]
     }
 
     #[inline(always)]
     fn packed<const WIDTH: u32, const ROWS: u32>(self, at: Packed<WIDTH, ROWS>, colour: impl Fn(usize) -> u16) -> u16 {
         let share = |shift: u32| at.0.wrapping_shr(shift.wrapping_sub(SHARE_BITS)) & ((1 << SHARE_BITS) - 1);
-        let (across, down) = (share(32u32.wrapping_sub(WIDTH)), share(WIDTH));
+        let (across, down) = (share(32u32.wrapping_sub(WIDTH)), share(fraction(WIDTH)));
         let first = at.texel();
         let below = first.wrapping_add(1 << WIDTH);
         Self::mean([colour(first), colour(first.wrapping_add(1)), colour(below), colour(below.wrapping_add(1))], across, down)
@@ -176,6 +177,7 @@ mod tests {
     use crate::atlas::Texture;
     use crate::fixed::PlayUv;
     use crate::span::Packed;
+    use crate::window::fraction;
 
     fn colour([r, g, b]: [u16; 3]) -> u16 {
         r << 11 | g << 5 | b
@@ -224,13 +226,25 @@ mod tests {
         }
     }
 
-    /// Holds the pixel at `at` in a window against that at `uv`, the same position in a picture of the window's size.
-    fn same<F: Filter>(filter: F, at: Packed<9, 5>, uv: PlayUv, x: usize) {
-        let texture = Texture { texels: &[], mask: &[], width_log2: 9, height: 32 };
+    /// Holds the pixel at u and v, 512ths of a texel, in a window against that at the same position in a picture of the window's size.
+    fn same<F: Filter, const WIDTH: u32, const ROWS: u32>(filter: F, [u, v]: [u32; 2], x: usize) {
+        let texture = Texture { texels: &[], mask: &[], width_log2: WIDTH, height: 1 << ROWS };
         let colour = |index: usize| (index as u16).wrapping_mul(40_503);
-        let [even, odd] = filter.offsets(9);
-        let moved = Packed::<9, 5>(at.0.wrapping_add(if x == 0 { even } else { odd }));
+        let [even, odd] = filter.offsets(WIDTH);
+        let at = u << (fraction(WIDTH) + ROWS) | v;
+        let moved = Packed::<WIDTH, ROWS>(at.wrapping_add(if x == 0 { even } else { odd }));
+        let uv = PlayUv { u: (u << 7) as i32, v: (v << 7) as i32 };
         assert_eq!(filter.packed(moved, colour), filter.at(uv, x, &texture, colour), "{uv:?}");
+    }
+
+    fn same_by_all<const WIDTH: u32, const ROWS: u32>(position: [u32; 2]) {
+        for x in 0..2 {
+            for y in 0..2 {
+                same::<_, WIDTH, ROWS>(Dither::new(y), position, x);
+            }
+            same::<_, WIDTH, ROWS>(Bilinear::<false>, position, x);
+            same::<_, WIDTH, ROWS>(Nearest, position, x);
+        }
     }
 
     #[test]
@@ -238,17 +252,9 @@ mod tests {
         let mut next = colours();
         for _ in 0..2000 {
             let [a, b, c] = next().map(u32::from);
-            // On whole 512ths of a texel, as packed positions are.
-            let (u, v) = ((a * 8 + 1) * 512 + b * 8, (c.min(29) + 1) * 512 + b * 8 + a / 4);
-            let uv = PlayUv { u: (u << 7) as i32, v: (v << 7) as i32 };
-            let at = Packed::<9, 5>(u << 14 | v);
-            for x in 0..2 {
-                for y in 0..2 {
-                    same(Dither::new(y), at, uv, x);
-                }
-                same(Bilinear::<false>, at, uv, x);
-                same(Nearest, at, uv, x);
-            }
+            // On whole 512ths of a texel, as packed positions of these windows are.
+            same_by_all::<9, 5>([(a * 8 + 1) * 512 + b * 8, (c.min(29) + 1) * 512 + b * 8 + a / 4]);
+            same_by_all::<7, 7>([(a + 1) * 512 + b * 8, (c * 3 + 1) * 512 + b * 8 + a / 4]);
         }
     }
 }

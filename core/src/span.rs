@@ -5,32 +5,35 @@ use crate::atlas::Texture;
 use crate::coverage::{Chart, Cover};
 use crate::fixed::PlayUv;
 use crate::sheet::Corners;
-use crate::window::{TILE_LOG2, Tile};
+use crate::window::{TILE_LOG2, Tile, fraction};
 
-/// A position in a window: v in its lower WIDTH + ROWS bits, WIDTH of them its fraction, u above, its upper WIDTH bits the texel.
+/// A position in a window: v in its lower bits, [`fraction`] of them its fraction and ROWS above, then u, its upper WIDTH bits the texel.
 #[derive(Clone, Copy, Debug)]
 pub struct Packed<const WIDTH: u32, const ROWS: u32>(pub u32);
 
 impl<const WIDTH: u32, const ROWS: u32> Packed<WIDTH, ROWS> {
-    const BITS: u32 = WIDTH + ROWS;
+    const FRACTION: u32 = fraction(WIDTH);
+    const BITS: u32 = Self::FRACTION.wrapping_add(ROWS);
     const LOW: u32 = (1 << Self::BITS) - 1;
     /// How far the texel's column is shifted down.
     const ACROSS: u32 = 32 - WIDTH;
-    /// The texel's row, which stands where its place in the window has it.
-    const DOWN: u32 = Self::LOW & !((1 << WIDTH) - 1);
+    /// How far its row stands above where its place in the window has it: most stand there.
+    const ABOVE: u32 = Self::FRACTION.wrapping_sub(WIDTH);
+    /// The texel's row, there.
+    const DOWN: u32 = ((1 << ROWS) - 1) << WIDTH;
 
     /// The texel's place in its window, below 2^(WIDTH + ROWS).
     #[must_use]
     #[inline(always)]
     pub const fn texel(self) -> usize {
-        (self.0 >> Self::ACROSS | self.0 & Self::DOWN) as usize
+        (self.0 >> Self::ACROSS | self.0 >> Self::ABOVE & Self::DOWN) as usize
     }
 
     /// The position in the picture, for a window from `row` on.
     #[must_use]
     pub fn at(self, row: u16) -> PlayUv {
         let u = (self.0 >> Self::BITS).wrapping_shl(Self::BITS.wrapping_add(WIDTH).wrapping_sub(16));
-        let v = (self.0 & Self::LOW).wrapping_shl(16u32.wrapping_sub(WIDTH)).wrapping_add(u32::from(row).wrapping_shl(16));
+        let v = (self.0 & Self::LOW).wrapping_shl(16u32.wrapping_sub(Self::FRACTION)).wrapping_add(u32::from(row).wrapping_shl(16));
         PlayUv { u: u as i32, v: v as i32 }
     }
 }

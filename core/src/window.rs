@@ -30,6 +30,12 @@ impl Tile {
 /// Tiles are at most 2^this pixels wide and high: over more of them rounding would add up to something.
 pub const TILE_LOG2: u32 = 3;
 
+/// Fraction bits of v in windows 2^`width_log2` texels wide: where there can be as many, whole rows begin as many texels apart as the picture's do.
+#[must_use]
+pub const fn fraction(width_log2: u32) -> u32 {
+    if width_log2 < 8 { 9 } else { width_log2 }
+}
+
 /// How positions are held in a window, where the picture's width allows for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Window {
@@ -50,10 +56,11 @@ impl Window {
     #[must_use]
     pub const fn new(width_log2: u32, height: u32) -> Option<Self> {
         let rows_log2 = match width_log2 {
+            7 => 7,
             10 => 4,
             _ => 6,
         };
-        let known = matches!(width_log2, 8..=10);
+        let known = matches!(width_log2, 7..=10);
         if known && height >= 1 << rows_log2 { Some(Self { width_log2, rows_log2 }) } else { None }
     }
 
@@ -61,10 +68,10 @@ impl Window {
     /// divided by 2^`log2`, each to the nearest.
     #[inline(always)]
     pub const fn pack(self, u: i32, v: i32, log2: u32) -> u32 {
-        let bits = self.width_log2.wrapping_add(self.rows_log2);
-        // u has what v and whole texels leave of 32 bits for its fraction, v as many as the picture's width.
+        let bits = fraction(self.width_log2).wrapping_add(self.rows_log2);
+        // u has what v and whole texels leave of 32 bits for its fraction.
         let across = 16u32.wrapping_add(bits).wrapping_add(self.width_log2).wrapping_sub(32).wrapping_add(log2);
-        let down = 16u32.wrapping_sub(self.width_log2).wrapping_add(log2);
+        let down = 16u32.wrapping_sub(fraction(self.width_log2)).wrapping_add(log2);
         (rounded(u, across) as u32).wrapping_shl(bits).wrapping_add(rounded(v, down) as u32)
     }
 

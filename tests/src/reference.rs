@@ -385,7 +385,7 @@ pub fn tile(cell: u32, space: u8) -> u32 {
 #[must_use]
 pub fn packed(cell: u32, space: u8, width_log2: u32) -> f64 {
     let steps = match width_log2 {
-        8..=10 => 256.0,
+        7..=10 => 256.0,
         // No tiles there.
         _ => f64::INFINITY,
     };

@@ -102,8 +102,7 @@ fn hard_scenes_are_no_less_stable() {
         let [low, high] = corners().fold([DVec3::MAX, DVec3::MIN], |[low, high], corner| [low.min(corner), high.max(corner)]);
         // A millionth of a scene that is no larger than that would be another scene.
         let little = LITTLE * (high - low).length().min(1.0);
-        let mut settings = Settings::default();
-        (settings.atlas.max_side, settings.atlas.charts) = (256, case.family.into());
+        let settings = case.settings();
         let still = played_as(&scene, &settings);
         for (what, changed) in [("scene", shaken(&scene, little)), ("camera", aside(&scene, little))] {
             let moved = played_as(&changed, &settings);

@@ -8,7 +8,6 @@ use super::place::Place;
 use crate::chart::{self, Chart, Charting, Parts};
 use crate::gbuffer::Hits;
 use crate::scene::Scene;
-use cubist_core::format::TexelKind;
 use std::cmp::Reverse;
 
 /// An image filled like this is left alone.
@@ -26,18 +25,12 @@ const WORTH: f64 = 3.0;
 /// Nothing is cut for less than this share of the image: every cut takes memory of the player, too.
 const SOME: f64 = 0.1;
 
-/// Cuts some of the charts in two while that pays in an image of raw texels of `kind`; how many. `pack` lays charts out.
-pub(super) fn halve(
-    scene: &Scene,
-    hits: &Hits,
-    charting: &mut Charting,
-    kind: TexelKind,
-    pack: impl Fn(&Charting) -> Option<Layout>,
-) -> usize {
+/// Cuts some of the charts in two while that pays in an image of raw texels that take `texel` bytes each; how many. `pack` lays charts out.
+pub(super) fn halve(scene: &Scene, hits: &Hits, charting: &mut Charting, texel: f64, pack: impl Fn(&Charting) -> Option<Layout>) -> usize {
     let (mut packed, mut cuts) = (pack(charting), 0);
     // Where not all the density fits, room is short for another reason.
     while let Some(layout) = packed.filter(|layout| layout.scale >= 1.0 && cuts < CUTS) {
-        let whole = layout.width * layout.height;
+        let whole = layout.worth();
         let sizes: Vec<[u32; 2]> = layout.places.iter().map(Place::size).collect();
         let masks = Footprints::new(scene, hits, charting).drawn(&sizes, layout.scale);
         let area: u32 = masks.iter().map(Mask::area).sum();
@@ -53,10 +46,8 @@ pub(super) fn halve(
             let layout = pack(charting).filter(|layout| layout.scale >= 1.0);
             let cut = charting.exchange(before);
             let Some(layout) = layout else { continue };
-            let saved = whole.saturating_sub(layout.width * layout.height);
-            // A texel's bit of the mask counts, too.
-            let bytes = kind.bytes(saved as usize) as f64 + f64::from(saved) / 8.0;
-            let gain = bytes - WORTH * (told - keys);
+            let saved = whole.saturating_sub(layout.worth());
+            let gain = texel * f64::from(saved) - WORTH * (told - keys);
             if f64::from(saved) > SOME * f64::from(whole) && gain > best.as_ref().map_or(0.0, |best| best.gain) {
                 best = Some(Cut { gain, cut, layout });
             }

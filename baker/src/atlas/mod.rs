@@ -11,7 +11,7 @@ mod palette;
 mod place;
 mod strip;
 
-use crate::chart::{self, Charting, Choice, Family};
+use crate::chart::{self, Charting, Choice, Density, Family};
 use crate::gbuffer::{BACKGROUND, GBuffer, Hits};
 use crate::scene::{Background, Scene};
 use crate::shade::Shader;
@@ -26,6 +26,10 @@ use thiserror::Error;
 pub const MAX_LABELS: usize = 256;
 /// Labels beyond this are avoided by sharing them.
 const WANTED_LABELS: usize = 255;
+
+/// Frames whose keys take about as much as a source image. What a texel is worth is weighed against the whole bundle, and that of a path of few
+/// frames is hardly smaller.
+pub const LONGER: f64 = 128.0;
 
 /// Why there is no source image.
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
@@ -78,6 +82,9 @@ pub struct Settings {
     pub max_side: u32,
     /// Texels a pixel, at most, where a chart is seen closest.
     pub density: f64,
+    /// What detail is worth, bytes: charts that few pixels see closely get fewer texels. For each pixel of each frame, times the square of the
+    /// octaves that its texel is longer than the pixel; a path counts [`LONGER`] frames more than it has. Infinite: all charts have `density`.
+    pub detail: f64,
     /// What a texel is.
     pub texels: TexelKind,
     /// Palette entries, at most: 2..=256. What the texels have no room for is not used; those without a palette have none.
@@ -90,7 +97,15 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { max_side: 512, density: 1.0, texels: TexelKind::Indexed8, colours: 256, storage: Storage::Raw, charts: Family::Own.into() }
+        Self {
+            max_side: 512,
+            density: 1.0,
+            detail: 0.03,
+            texels: TexelKind::Indexed8,
+            colours: 256,
+            storage: Storage::Raw,
+            charts: Family::Own.into(),
+        }
     }
 }
 
@@ -184,11 +199,14 @@ pub fn build(scene: &Scene, hits: &Hits, settings: &Settings, progress: &(dyn Fn
         return Err(AtlasError::Side(settings.max_side));
     }
     progress(0, 4);
-    let mut charting = chart::build(scene, hits, settings.charts.family, settings.density.clamp(0.05, 8.0), settings.max_side);
+    let texel = texel_bytes(settings.texels);
+    let detail = settings.detail * (f64::from(hits.frames) + LONGER) / f64::from(hits.frames.max(1));
+    let density = Density { most: settings.density.clamp(0.05, 8.0), detail, texel };
+    let mut charting = chart::build(scene, hits, settings.charts.family, &density, settings.max_side);
     let backdrop = backdrop(scene, hits);
     let pack = |charting: &Charting| pack::pack(&footprint::Footprints::new(scene, hits, charting), backdrop, settings.max_side);
     let halved = match settings.storage {
-        Storage::Raw => halve::halve(scene, hits, &mut charting, settings.texels, pack),
+        Storage::Raw => halve::halve(scene, hits, &mut charting, texel, pack),
         // Empty texels take next to nothing.
         Storage::Packed => 0,
     };
@@ -217,6 +235,11 @@ pub fn build(scene: &Scene, hits: &Hits, settings: &Settings, progress: &(dyn Fn
     progress(4, 4);
     let image = SourceImage { width: layout.width, height: layout.height, kind, texels, palette, covered: filled.covered, labels };
     Ok(Atlas { image, gbuffer, figures })
+}
+
+/// Bytes of a raw texel, its bit of the mask counted in.
+fn texel_bytes(kind: TexelKind) -> f64 {
+    (kind.bytes(8) + 1) as f64 / 8.0
 }
 
 /// The size the background wants: one colour needs little, a picture that is never seen as well.

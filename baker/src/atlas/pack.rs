@@ -25,7 +25,7 @@ const BACK: i32 = 40;
 /// Texels that an image may be larger by for windows: without them the player draws pixel by pixel, which takes two to four times as long.
 const WINDOWED: u32 = 4096;
 /// Rows that an image may be given for that.
-const ROWS: [u32; 2] = [16, 64];
+const ROWS: [u32; 3] = [16, 64, 128];
 /// Orders for searching a scale; all are tried at the scale found.
 const QUICK: usize = 3;
 /// Shuffled orders, fewer where there are many charts to lay down in each.
@@ -44,6 +44,13 @@ pub(crate) struct Layout {
     pub backdrop: [u32; 4],
     /// One for each chart.
     pub places: Vec<Place>,
+}
+
+impl Layout {
+    /// What it takes, texels; more by what windows are worth where it has none.
+    pub fn worth(&self) -> u32 {
+        worth([self.width, self.height])
+    }
 }
 
 /// Masks in all their turns: the background's, then the charts'.

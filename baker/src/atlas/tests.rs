@@ -102,9 +102,13 @@ fn hits(scene: &Scene) -> Hits {
     Hits::cast(scene, &Tracer::new(scene), &|_, _| {})
 }
 
-/// Charts as the charting makes them: raw pictures' may be cut once more.
+/// A texel a pixel wherever a chart is seen closest.
+const ALL: Density = Density { most: 1.0, detail: f64::INFINITY, texel: 1.0 };
+
+/// Charts as the charting makes them, with all their texels: raw pictures' may be cut once more.
 fn made_as(scene: &Scene, hits: &Hits, charts: impl Into<Choice>) -> Atlas {
-    build(scene, hits, &Settings { charts: charts.into(), storage: Storage::Packed, ..Settings::default() }, &|_, _| {}).expect("an atlas")
+    let settings = Settings { charts: charts.into(), detail: f64::INFINITY, storage: Storage::Packed, ..Settings::default() };
+    build(scene, hits, &settings, &|_, _| {}).expect("an atlas")
 }
 
 fn rewarped(family: Family) -> Choice {
@@ -264,18 +268,14 @@ fn planes_are_charts_of_their_own_and_a_smooth_hill_is_one() {
 fn texels_lie_in_their_own_charts_footprint() {
     for (scene, moved) in [cube(), hill(), crossing()].into_iter().flat_map(|s| [(s.clone(), false), (s, true)]) {
         let hits = hits(&scene);
-        let mut charting = chart::build(&scene, &hits, Family::Planes, 1.0, 512);
+        let mut charting = chart::build(&scene, &hits, Family::Planes, &ALL, 512);
         if moved {
             chart::rewarp(&hits, &mut charting);
         }
         let footprints = footprint::Footprints::new(&scene, &hits, &charting);
         for side in [64, 512] {
             let layout = pack::pack(&footprints, [4, 4], side).expect("a layout");
-            let size = |place: &place::Place| {
-                let [x0, y0, x1, y1] = place.rect;
-                if place.swap { [y1 - y0, x1 - x0] } else { [x1 - x0, y1 - y0] }
-            };
-            let mut masks = footprints.drawn(&layout.places.iter().map(size).collect::<Vec<_>>(), layout.scale);
+            let mut masks = footprints.drawn(&layout.places.iter().map(place::Place::size).collect::<Vec<_>>(), layout.scale);
             footprints.add_seen(&mut masks);
             // The chart of every texel, from the masks, turned as their places are.
             let mut owner = vec![None; (layout.width * layout.height) as usize];
@@ -351,6 +351,21 @@ fn a_bent_chart_is_cut_where_texels_are_raw() {
     // What is seen is where it is covered, whatever it was cut from.
     assert!(seen(&hits, &raw).all(|(_, _, uv)| raw.image.covered[texel(&raw.image, uv)]));
     assert!(psnr(&scene, &hits, &raw) > psnr(&scene, &hits, &packed) - 0.5);
+}
+
+#[test]
+fn detail_takes_the_texels_that_it_is_worth() {
+    let texels = |scene: &Scene, detail: f64, texels: TexelKind| {
+        let settings = Settings { detail, texels, charts: Family::Planes.into(), ..Settings::default() };
+        let atlas = build(scene, &hits(scene), &settings, &|_, _| {}).expect("it fits");
+        atlas.image.covered.iter().filter(|&&covered| covered).count()
+    };
+    let scene = cube();
+    let [all, much, usual, little] = [f64::INFINITY, 1.0, 0.03, 0.003].map(|detail| texels(&scene, detail, TexelKind::Indexed8));
+    assert!(all >= much && much > usual && usual > 2 * little, "{all} {much} {usual} {little}");
+    // Texels of two bytes have to show more, those of half a byte less.
+    let [four, direct] = [TexelKind::Indexed4, TexelKind::Direct565].map(|kind| texels(&scene, 0.03, kind));
+    assert!(four > usual && usual > direct, "{four} {usual} {direct}");
 }
 
 #[test]

@@ -1,20 +1,25 @@
 //! Measuring of charts: how dense they have to be, which way they lie best, how far they reach.
 //! Samples come from the G-buffer; the figures go to `fold` and to the packing.
 
-use super::{Chart, Charting, Projection};
+use super::{Chart, Charting, Density, Projection};
 use crate::gbuffer::{BACKGROUND, Hits, Lens};
 use crate::scene::Scene;
 use glam::DVec3;
 use rayon::prelude::*;
 
-/// The share of a chart's pixels that is shown at the density asked for: one close-up must not blow up the rest.
+/// The share of a chart's pixels that is shown at the density asked for, at most: one close-up must not blow up the rest.
 const SHARE: f64 = 0.9;
+/// Octaves that a chart may be coarser, at most, for what its texels take.
+const COARSER: usize = 3;
+/// The share of a source image that charts fill.
+const FILL: f64 = 0.7;
 /// Directions tried over half a turn for the chart's smallest rectangle.
 const TURNS: usize = 32;
 /// Charts in all tables together, at most, while there are two tables: 3 kB each.
 const TABLES: usize = 100_000;
-/// Histogram bins: 8 an octave of single-precision numbers from 2^-40 to 2^40.
+/// Histogram bins: [`OCTAVE`] an octave of single-precision numbers from 2^-40 to 2^40.
 const BINS: usize = 640;
+const OCTAVE: usize = 8;
 const FIRST_BIN: u32 = (127 - 40) << 3;
 
 fn bin(density: f64) -> usize {
@@ -51,7 +56,8 @@ impl Figures {
         self.reach.iter_mut().zip(other.reach).for_each(|(a, b)| *a = a.max(b));
     }
 
-    fn density(&self) -> f64 {
+    /// Texels a unit that most of the chart's pixels ask for.
+    fn closest(&self) -> f64 {
         let mut left = (SHARE * self.hits as f64) as u64;
         let of = |(i, &n): (usize, &u32)| {
             let here = u64::from(n);
@@ -63,10 +69,27 @@ impl Figures {
         };
         self.densities.iter().enumerate().find_map(of).unwrap_or(1.0)
     }
+
+    /// Texels a unit that are worth their bytes in a chart whose faces cover `area` square units: no more than most pixels ask for.
+    fn density(&self, area: f64, wanted: &Density) -> f64 {
+        let closest = self.closest();
+        if wanted.detail.is_infinite() {
+            return closest;
+        }
+        let cost = |density: f64| {
+            let at = bin(density);
+            // Octaves that texels are too long, squared, pixel by pixel.
+            let blurred =
+                self.densities.iter().enumerate().skip(at).map(|(i, &n)| f64::from(n) * ((i - at) as f64 / OCTAVE as f64).powi(2));
+            area / FILL * density * density * wanted.texel + wanted.detail * blurred.sum::<f64>()
+        };
+        let coarser = (0..=COARSER * OCTAVE).map(|steps| closest * libm::exp2(-(steps as f64) / OCTAVE as f64));
+        coarser.min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(closest)
+    }
 }
 
-/// Sets every chart's axes, density (at most `density` texels a pixel) and bounds.
-pub(super) fn measure(scene: &Scene, hits: &Hits, charting: &mut Charting, density: f64, max_side: u32) {
+/// Sets every chart's axes, density and bounds.
+pub(super) fn measure(scene: &Scene, hits: &Hits, charting: &mut Charting, density: &Density, max_side: u32) {
     charting.flatten(scene);
     let turns: [[f64; 2]; TURNS] = std::array::from_fn(|k| {
         let angle = k as f64 * core::f64::consts::PI / TURNS as f64;
@@ -110,16 +133,27 @@ pub(super) fn measure(scene: &Scene, hits: &Hits, charting: &mut Charting, densi
             table
         })
         .collect();
+    let areas = areas(charting);
     for (i, chart) in charting.charts.iter_mut().enumerate() {
         let mut figures = Figures::new();
         tables.iter().filter_map(|t| t[i].as_ref()).for_each(|f| figures.merge(f));
-        settle(chart, &figures, &turns, density, max_side);
+        settle(chart, &figures, &turns, density.most * figures.density(areas[i], density), max_side);
     }
     charting.flatten(scene);
     snap(charting);
 }
 
-/// Turns the chart into its smallest rectangle and sets its density.
+/// What the faces of each chart cover, flattened, square units.
+fn areas(charting: &Charting) -> Vec<f64> {
+    let mut areas = vec![0.0; charting.charts.len()];
+    for (face, &chart) in charting.chart_of.iter().enumerate() {
+        let [a, b, c] = charting.outline(face).map(|[x, y, _]| [x, y]);
+        areas[chart as usize] += 0.5 * ((b[0] - a[0]) * (c[1] - a[1]) - (c[0] - a[0]) * (b[1] - a[1])).abs();
+    }
+    areas
+}
+
+/// Turns the chart into its smallest rectangle and sets its density: `density`, or as much as fits.
 fn settle(chart: &mut Chart, figures: &Figures, turns: &[[f64; 2]; TURNS], density: f64, max_side: u32) {
     let side = |k: usize| figures.reach[k] + figures.reach[TURNS + k];
     let area = |k: usize| side(k) * side(k + TURNS / 2);
@@ -140,7 +174,7 @@ fn settle(chart: &mut Chart, figures: &Figures, turns: &[[f64; 2]; TURNS], densi
     chart.hi = [figures.reach[k], figures.reach[l]];
     let longest = side(k).max(side(l)).max(f64::MIN_POSITIVE);
     // A plane that runs from the camera to the horizon would fill any image.
-    chart.density = (figures.density() * density).min(f64::from(max_side) / longest).max(1e-9);
+    chart.density = density.min(f64::from(max_side) / longest).max(1e-9);
 }
 
 /// Extends bounds that end within two texels of the chart's faces to the faces' end: an outline that is seen is kept.
@@ -180,4 +214,42 @@ pub(super) fn bound(hits: &Hits, charting: &mut Charting) {
         chart.hits += 1;
     }
     snap(charting);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// So many pixels that ask for so many texels a unit.
+    fn seen(pixels: &[(u32, f64)]) -> Figures {
+        let mut figures = Figures::new();
+        for &(n, density) in pixels {
+            figures.densities[bin(density)] += n;
+            figures.hits += u64::from(n);
+        }
+        figures
+    }
+
+    #[test]
+    fn texels_are_worth_what_they_show() {
+        let of = |pixels: &[(u32, f64)], area: f64, detail: f64, texel: f64| {
+            libm::log2(seen(pixels).density(area, &Density { most: 1.0, detail, texel }))
+        };
+        let about = |octaves: f64, expected: f64| assert!((octaves - expected).abs() <= 1.0 / OCTAVE as f64, "{octaves}, not {expected}");
+        // All that was asked for, where detail is worth any bytes or is seen by many; no less than the coarsest, where nearly nobody does.
+        about(of(&[(1000, 16.0)], 700.0, f64::INFINITY, 1.0), 4.0);
+        about(of(&[(1_000_000_000, 16.0)], 700.0, 1.0, 1.0), 4.0);
+        about(of(&[(10, 16.0)], 700.0, 1.0, 1.0), 4.0 - COARSER as f64);
+        // One texel for each of a thousand pixels that see it: 1000/4^x + detail x^2 1000 is least at x where 4^x x = ln 4 / (2 detail).
+        for octaves in [0.5, 1.0, 2.0] {
+            let detail = libm::log(4.0) / (2.0 * octaves * libm::exp2(2.0 * octaves));
+            about(of(&[(1000, 1.0)], 1000.0 * FILL, detail, 1.0), -octaves);
+            // Texels of twice the bytes are worth it where detail is worth twice as much.
+            about(of(&[(1000, 1.0)], 1000.0 * FILL, 2.0 * detail, 2.0), -octaves);
+        }
+        // Some that see it closer want more, but no more than if all did.
+        let [far, mixed, close] =
+            [[(1000, 1.0), (0, 4.0)], [(800, 1.0), (200, 4.0)], [(0, 1.0), (1000, 4.0)]].map(|p| of(&p, 1000.0, 1.0, 1.0));
+        assert!(far < mixed && mixed < close, "{far} {mixed} {close}");
+    }
 }

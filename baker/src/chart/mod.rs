@@ -72,6 +72,18 @@ pub(crate) struct Parts {
     charts: Vec<Chart>,
 }
 
+/// How many texels charts get.
+#[derive(Clone, Copy, Debug)]
+pub struct Density {
+    /// Texels a pixel, at most, where a chart is seen closest.
+    pub most: f64,
+    /// What detail is worth, bytes: for each pixel of each frame, times the square of the octaves that its texel is longer than the pixel.
+    /// Infinite: all charts have `most`.
+    pub detail: f64,
+    /// What a texel takes, bytes.
+    pub texel: f64,
+}
+
 /// All charts of a scene.
 pub struct Charting {
     /// The seen faces.
@@ -193,16 +205,16 @@ pub fn brings_own(scene: &Scene) -> bool {
     !scene.triangles.is_empty() && scene.triangles.iter().all(|t| t.island.is_some())
 }
 
-/// Cuts what is seen into charts with at most `density` texels a pixel, for a source image of sides up to `max_side`. The scene's own flattening
-/// is kept at `density` of its texels, at most all. `Family::Own` is the model's texture for a scene without, and `Family::Planes` where that does
+/// Cuts what is seen into charts of this density, for a source image of sides up to `max_side`. The scene's own flattening
+/// is kept, at its highest density of its texels, at most all. `Family::Own` is the model's texture for a scene without, and `Family::Planes` where that does
 /// not flatten it.
-pub fn build(scene: &Scene, hits: &Hits, family: Family, density: f64, max_side: u32) -> Charting {
+pub fn build(scene: &Scene, hits: &Hits, family: Family, density: &Density, max_side: u32) -> Charting {
     let own = family == Family::Own && brings_own(scene);
     let (faces, links) = observe::observe(scene, hits, !own);
     if own {
         let mut charting = islands::build(scene, hits, faces);
         // The scene's own texels are the finest there are.
-        charting.charts.iter_mut().for_each(|chart| chart.density *= density.min(1.0));
+        charting.charts.iter_mut().for_each(|chart| chart.density *= density.most.min(1.0));
         return charting;
     }
     let islands = if family == Family::Own { Islands::new(scene).ok() } else { None };
@@ -219,8 +231,13 @@ pub fn build(scene: &Scene, hits: &Hits, family: Family, density: f64, max_side:
     let mut charting = Charting { charts: Vec::new(), chart_of: Vec::new(), corners: Vec::new(), warps: Vec::new(), faces };
     let mut best: Option<(f64, Vec<u32>, Vec<Chart>)> = None;
     for clusters in candidates {
-        let chart =
-            |(view, depth): (&View, f64)| Chart { projection: view.projection(depth), density, lo: [0.0; 2], hi: [0.0; 2], hits: 0 };
+        let chart = |(view, depth): (&View, f64)| Chart {
+            projection: view.projection(depth),
+            density: density.most,
+            lo: [0.0; 2],
+            hi: [0.0; 2],
+            hits: 0,
+        };
         charting.charts = clusters.views.iter().zip(charting.depths(&clusters)).map(chart).collect();
         charting.chart_of = clusters.of;
         measure::measure(scene, hits, &mut charting, density, max_side);

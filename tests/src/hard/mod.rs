@@ -100,15 +100,21 @@ pub struct Baked {
 }
 
 impl Case {
-    /// Bakes the case at default settings but for a small source image.
+    /// The default but for a small source image, in which a texel is no coarser than a pixel: what a picture may do without is no question here.
+    #[must_use]
+    pub fn settings(&self) -> Settings {
+        let mut settings = Settings::default();
+        (settings.atlas.max_side, settings.atlas.charts, settings.atlas.detail) = (256, self.family.into(), f64::INFINITY);
+        settings
+    }
+
+    /// Bakes the case.
     ///
     /// # Errors
     /// The baker's.
     pub fn bake(&self) -> Result<Baked> {
         let scene = (self.scene)();
-        let mut settings = Settings::default();
-        (settings.atlas.max_side, settings.atlas.charts) = (256, self.family.into());
-        let (flat, encoded) = scenes::bake(&scene, &settings)?;
+        let (flat, encoded) = scenes::bake(&scene, &self.settings())?;
         Ok(Baked { scene, flat, encoded })
     }
 }
