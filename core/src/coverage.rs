@@ -5,6 +5,7 @@
 use crate::atlas::Texture;
 use crate::fixed::{PLAY_BITS, PlayUv};
 use crate::format::{LabelRecord, MASKED, STRIP};
+use crate::patch::Form;
 
 /// How much of something a sheet covers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,44 +76,38 @@ impl Chart {
         inside && (!self.masked() || texture.covered(uv))
     }
 
-    /// How much the chart covers of a block whose left and right edges end at these positions, with some room for rounding.
-    // Without what lies around them: one position mostly tells that not all are beyond an edge.
+    /// How much the chart covers of what lies within `bounds`, with some room for rounding.
     #[must_use]
     #[inline(always)]
-    pub fn cover(&self, [[a, b], [c, d]]: [[PlayUv; 2]; 2], texture: &Texture<'_>) -> Cover {
+    pub fn cover(&self, bounds: &Bounds, texture: &Texture<'_>) -> Cover {
+        let &Bounds { low, high } = bounds;
         let (left, right) = (self.left.wrapping_sub(SLACK), self.right.wrapping_add(SLACK));
         let (top, bottom) = (self.top.wrapping_sub(SLACK), self.bottom.wrapping_add(SLACK));
-        if a.u < left && b.u < left && c.u < left && d.u < left
-            || a.u >= right && b.u >= right && c.u >= right && d.u >= right
-            || a.v < top && b.v < top && c.v < top && d.v < top
-            || a.v >= bottom && b.v >= bottom && c.v >= bottom && d.v >= bottom
-        {
+        if high.u < left || low.u >= right || high.v < top || low.v >= bottom {
             return Cover::Nothing;
         }
         const TWICE: i32 = 2 * SLACK;
         let (left, right) = (left.wrapping_add(TWICE), right.wrapping_sub(TWICE));
         let (top, bottom) = (top.wrapping_add(TWICE), bottom.wrapping_sub(TWICE));
-        let inside = |uv: PlayUv| uv.u >= left && uv.u < right && uv.v >= top && uv.v < bottom;
-        let all = inside(a) && inside(b) && inside(c) && inside(d);
-        if all && (!self.masked() || filled(texture, &Bounds::around(&[a, b, c, d]).wider(SLACK))) { Cover::All } else { Cover::Part }
+        let all = low.u >= left && high.u < right && low.v >= top && high.v < bottom;
+        if all && (!self.masked() || filled(texture, &bounds.wider(PlayUv { u: SLACK, v: SLACK }))) { Cover::All } else { Cover::Part }
     }
 
-    /// Passes those of the rectangle's edges on that what lies between the corners of a block, within `bounds`, may cross.
+    /// Passes those of the rectangle's edges on that what lies within `bounds` may cross; `forms`: how it goes, u and v.
     #[inline(always)]
-    pub fn crossed(&self, corners: &[PlayUv; 4], &Bounds { low, high }: &Bounds, mut pass: impl FnMut(Edge)) {
-        let (across, down) = (corners.map(|uv| uv.u), corners.map(|uv| uv.v));
+    pub fn crossed(&self, [u, v]: &[Form; 2], &Bounds { low, high }: &Bounds, mut pass: impl FnMut(Edge)) {
         // One after the other: a list of them would be written to memory.
         if low.u < self.left.wrapping_add(SLACK) {
-            pass(Edge::new(across, self.left, false));
+            pass(Edge::new(u, self.left, false));
         }
         if high.u >= self.right.wrapping_sub(SLACK) {
-            pass(Edge::new(across, self.right, true));
+            pass(Edge::new(u, self.right, true));
         }
         if low.v < self.top.wrapping_add(SLACK) {
-            pass(Edge::new(down, self.top, false));
+            pass(Edge::new(v, self.top, false));
         }
         if high.v >= self.bottom.wrapping_sub(SLACK) {
-            pass(Edge::new(down, self.bottom, true));
+            pass(Edge::new(v, self.bottom, true));
         }
     }
 }
@@ -160,12 +155,11 @@ impl Bounds {
         Self { low: Self::of(self.low, other.low).low, high: Self::of(self.high, other.high).high }
     }
 
-    /// By so much more, every way.
+    /// By so much more to either side, and above and below.
     #[must_use]
     #[inline(always)]
-    const fn wider(self, by: i32) -> Self {
+    pub const fn wider(self, by: PlayUv) -> Self {
         let Self { low, high } = self;
-        let by = PlayUv { u: by, v: by };
         Self { low: low.less(by), high: high.plus(by) }
     }
 
@@ -180,19 +174,19 @@ impl Bounds {
 /// An edge of a chart's rectangle beside a block.
 #[derive(Clone, Copy, Debug)]
 pub struct Edge {
-    /// How far beyond it the block's corners are, above left and right, below left and right, Q16 texels.
-    pub beyond: [i32; 4],
+    /// How far beyond it the block's pixels are, Q16 texels.
+    pub beyond: Form,
     /// The chart is on the near side; else on the far one.
     pub upper: bool,
 }
 
 impl Edge {
-    /// The edge at `at` beside such `corners`.
+    /// The edge at `at`.
     #[inline(always)]
-    fn new(corners: [i32; 4], at: i32, upper: bool) -> Self {
-        Self { beyond: corners.map(|corner| corner.wrapping_sub(at)), upper }
+    const fn new(form: &Form, at: i32, upper: bool) -> Self {
+        Self { beyond: Form { at: form.at.wrapping_sub(at), ..*form }, upper }
     }
 }
 
-/// Rounding moves positions by less than this, Q16 texels.
-const SLACK: i32 = 64;
+/// Rounding moves positions by less than this, Q16 texels: by half a unit for each of a cell's pixels at most, and half of that for curves.
+const SLACK: i32 = 1024;

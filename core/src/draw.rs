@@ -6,11 +6,12 @@ use crate::fixed::PlayUv;
 use crate::key::{self, BACKDROP};
 use crate::lists::{CHART, FIELD};
 use crate::memory::Workspace;
+use crate::patch::Form;
 use crate::plan::{PLAIN, Plan, Run};
-use crate::site::Site;
-use crate::span::{self, Field, Packed, Span};
+use crate::site::{BLOCK_LOG2, Site};
+use crate::span::{self, Packed, Span};
 use crate::torn::{Mixed, Side};
-use crate::window::{TILE_LOG2, Tile};
+use crate::window::Tile;
 use crate::work::{Probe, Work};
 
 /// What pixels are made of positions.
@@ -63,7 +64,11 @@ impl Paint for Probes {
         log2: u32,
     ) {
         let label = run.label as u8;
-        span::any_run(tiles, row, out, log2, [0; 2], |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(run.row) });
+        let make = |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(run.row) };
+        match log2 {
+            3 => span::run::<_, WIDTH, ROWS, 8>(tiles, row, out, [0; 2], make),
+            _ => span::run::<_, WIDTH, ROWS, 4>(tiles, row, out, [0; 2], make),
+        }
     }
 
     #[inline(always)]
@@ -86,8 +91,8 @@ impl<'d, 'a> Drawing<'d, 'a> {
     where
         'a: 'd,
     {
-        let Workspace { texture, rows: [_, top, bottom, _], halfway, sheets, charts, plan, palette, backdrop, .. } = space;
-        let site = Site { bundle, texture: *texture, rows: [top, halfway, bottom], sheets, charts, backdrop: backdrop.as_ref() };
+        let Workspace { texture, rows: [top, bottom, _], sheets, charts, plan, palette, backdrop, .. } = space;
+        let site = Site { bundle, texture: *texture, rows: [top, bottom], sheets, charts, backdrop: backdrop.as_ref() };
         (Self { site, plan }, palette)
     }
 
@@ -107,7 +112,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
     /// pixel by pixel.
     #[inline(always)]
     fn runs<'o, P: Paint>(&mut self, y: u32, out: &'o mut [P::Pixel], work: &mut Work, paint: &P, sideless: bool) -> &'o mut [P::Pixel] {
-        let log2 = self.site.tile_log2();
+        let log2 = self.site.block_log2();
         let (strip, row) = (y >> log2, y & (1u32 << log2).wrapping_sub(1));
         let plan = &*self.plan;
         if plan.strip != Some(strip) || plan.reach != P::REACH || plan.sideless != sideless {
@@ -141,7 +146,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
     /// Draws the mixed blocks of pixel row `y`.
     #[inline(never)]
     fn mix<P: Paint, const WIDTH: u32, const ROWS: u32>(&self, y: u32, out: &mut [P::Pixel], paint: &P) {
-        let log2 = self.site.log2();
+        let log2 = self.site.block_log2();
         let row = y & (1u32 << log2).wrapping_sub(1);
         // Pictures wider than 512 texels are rare.
         match (P::SHORT && WIDTH <= 9, log2) {
@@ -185,7 +190,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
         for side in self.plan.side.get(..self.plan.sides).unwrap_or(&[]) {
             let shown = side.shown.row(row);
             if shown != 0
-                && let Some(pixels) = pixels(side.block, out, self.site.log2())
+                && let Some(pixels) = pixels(side.block, out, self.site.block_log2())
             {
                 paint.side::<WIDTH, ROWS>(side, row, shown, pixels);
             }
@@ -200,7 +205,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
     /// Draws pixel row `y` like [`Drawing::row`], but every pixel of a mixed block as `mean` has it of four, a quarter of a pixel off its
     /// centre both ways.
     pub fn smooth<P: Paint>(&mut self, y: u32, out: &mut [P::Pixel], work: &mut Work, paint: &P, mean: impl Fn([P::Pixel; 4]) -> P::Pixel) {
-        let log2 = self.site.log2();
+        let log2 = self.site.block_log2();
         let out = self.runs(y, out, work, paint, true);
         for mixed in self.mixed() {
             let Some(pixels) = pixels(mixed.block, out, log2) else { break };
@@ -209,7 +214,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
                 block(&self.site, *mixed, y, pixels, paint, None);
                 continue;
             }
-            let mut samples = [[P::Pixel::default(); 32]; 4];
+            let mut samples = [[P::Pixel::default(); 1 << BLOCK_LOG2]; 4];
             for (samples, beside) in samples.iter_mut().zip([[-1, -1], [1, -1], [-1, 1], [1, 1]]) {
                 if let Some(samples) = samples.get_mut(..pixels.len()) {
                     block(&self.site, *mixed, y, samples, paint, Some(beside));
@@ -275,7 +280,7 @@ fn cut<P: Paint>(paint: &P, run: Run, tiles: &[Tile], row: u32, out: &mut [P::Pi
     for tile in tiles {
         let (pixels, rest) = out.split_at_mut(out.len().min(1 << log2));
         out = rest;
-        let mut whole = [P::Pixel::default(); 1 << TILE_LOG2];
+        let mut whole = [P::Pixel::default(); 1 << BLOCK_LOG2];
         if let Some(made) = whole.get_mut(..1 << log2) {
             by_width(paint, run, core::slice::from_ref(tile), row, made, log2, width_log2);
         }
@@ -289,48 +294,36 @@ fn cut<P: Paint>(paint: &P, run: Run, tiles: &[Tile], row: u32, out: &mut [P::Pi
 /// pixel across and down.
 #[inline(never)]
 fn block<P: Paint>(site: &Site<'_, '_, '_>, mixed: Mixed, y: u32, pixels: &mut [P::Pixel], paint: &P, beside: Option<[i32; 2]>) {
-    let (log2, cell) = (site.log2(), site.bundle.grid().log2);
-    let row = y & (1u32 << log2).wrapping_sub(1);
-    let texture = site.texture;
-    let block = site.block(mixed.block.into(), y >> log2);
-    let mut left = u32::MAX.wrapping_shr(32u32.wrapping_sub(pixels.len() as u32));
+    let log2 = site.block_log2();
+    let [left_of, above] = site.offset(mixed.block.into(), y >> log2);
+    let offset = [left_of, above.wrapping_add(y & (1u32 << log2).wrapping_sub(1))];
+    let (texture, wide) = (site.texture, pixels.len() as u32);
+    let beside = |form: Form| beside.map_or(form, |beside| form.beside(beside));
+    let mut left = u32::MAX.wrapping_shr(32u32.wrapping_sub(wide));
     let mut sheets = mixed.sheets;
     while sheets != 0 && left != 0 {
         let place = usize::from(mixed.sheet).wrapping_add(sheets.trailing_zeros() as usize);
         sheets &= sheets.wrapping_sub(1);
         let Some(sheet) = site.sheets.sheet.get(place).map(|sheet| sheet.further(mixed.along)) else { break };
-        let sheet = &sheet;
+        let (sheet, chart) = (&sheet, site.chart(&sheet));
         let mut shown = left;
         // The last one covers what is left.
         let tested = sheets != 0;
         if tested && sheet.test() != CHART {
-            let step = y & (1u32 << cell).wrapping_sub(1);
-            let first = u32::from(mixed.block).wrapping_shl(log2) & (1u32 << cell).wrapping_sub(1);
-            let positive = |which: usize| {
-                let corners = block.field(sheet, which);
-                match beside {
-                    None => Field::new(corners, step, cell, first),
-                    Some(beside) => Field::beside(corners, step, cell, first, beside),
-                }
-                .positive(pixels.len())
-            };
-            shown &= positive(0);
-            if site.chart(sheet).strip() {
-                shown &= positive(1);
+            for which in 0..if chart.strip() { 2 } else { 1 } {
+                // Below zero where the field is above.
+                shown &= beside(site.field(sheet, which, offset)).negated().negative(wide);
             }
         }
         if shown == 0 {
             continue;
         }
-        let span = match beside {
-            None => Span::new(block.corners(sheet), row, log2),
-            Some(beside) => Span::beside(block.corners(sheet), row, log2, beside),
-        };
+        let forms = site.forms(sheet, offset).map(beside);
         if tested && sheet.test() != FIELD {
-            shown = span::inside(&site.chart(sheet), shown, pixels.len(), span, &texture);
+            shown = span::inside(&chart, shown, wide, &forms, &texture);
         }
         if shown != 0 {
-            span::paint(pixels, shown, span, &texture, |uv, x| paint.at(uv, sheet.label(), x));
+            span::paint(pixels, shown, Span::new(&forms), &texture, |uv, x| paint.at(uv, sheet.label(), x));
             left &= !shown;
         }
     }

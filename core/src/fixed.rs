@@ -67,21 +67,6 @@ impl PlayUv {
     }
 }
 
-/// The value halfway from `from` to `to` on the smoothest curve through them and what comes before and after on the same line, where there is
-/// such: the four-point rule (Dyn, Levin, Gregory 1987), a parabola without one of the outer two, the mean without both.
-/// Exact where all are the same.
-#[must_use]
-#[expect(clippy::arithmetic_side_effects, reason = "values are positions below 2^27.6 in size: no sum of four reaches 2^30")]
-pub const fn middle(before: Option<i32>, from: i32, to: i32, after: Option<i32>) -> i32 {
-    let bend = match (before, after) {
-        (Some(before), Some(after)) => ((from - before) + (to - after)) >> 3,
-        (Some(before), None) => ((from - before) + (from - to)) >> 2,
-        (None, Some(after)) => ((to - after) + (to - from)) >> 2,
-        (None, None) => 0,
-    };
-    (from + to + bend) >> 1
-}
-
 /// The largest size of a field code, which stands for 128 pixels.
 pub const MAX_FIELD: i32 = 37;
 
@@ -151,22 +136,6 @@ mod tests {
             let closest = (0..37).find(|&code| 2 * distance < field_distance(code) + field_distance(code + 1)).unwrap_or(37);
             assert_eq!((field_code(distance), field_code(-distance)), (closest, -closest), "{distance}");
         }
-    }
-
-    #[test]
-    fn middles_lie_on_lines_and_parabolas() {
-        for (before, after) in [(Some(0), Some(3)), (None, Some(3)), (Some(0), None), (None, None)] {
-            let line = |x: i32| x * 1000;
-            assert_eq!(middle(before.map(line), line(1), line(2), after.map(line)), 1500);
-            if before.or(after).is_some() {
-                // x^2 is 2.25 halfway from 1 to 2.
-                let parabola = |x: i32| x * x * 1024;
-                assert_eq!(middle(before.map(parabola), parabola(1), parabola(2), after.map(parabola)), 2304);
-            }
-        }
-        let far = (KEY_MAX << 11) / 4 * 5;
-        assert_eq!(middle(Some(far), far, far, Some(far)), far);
-        let _ = middle(Some(-far), far, far, Some(-far));
     }
 
     #[test]

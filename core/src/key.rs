@@ -35,6 +35,13 @@ impl Chain {
     pub const fn nodes(&self) -> u16 {
         self.end.wrapping_sub(self.first)
     }
+
+    /// Where its layer at node `column`, which it has, stands.
+    #[must_use]
+    #[inline(always)]
+    pub fn along(&self, column: u16) -> usize {
+        self.at.wrapping_add(column.wrapping_sub(self.first)).into()
+    }
 }
 
 /// One key's layers in caller's memory: row by row of nodes, in a row chain by chain, by label and from left to right.

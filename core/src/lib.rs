@@ -107,6 +107,7 @@ pub mod lists;
 mod memory;
 pub mod nodes;
 pub mod pack;
+mod patch;
 mod plan;
 pub mod plane;
 mod player;

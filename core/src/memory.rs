@@ -12,10 +12,11 @@ use crate::nodes::{self, Layout};
 use crate::pack::{self, Picture, Recent, Scratch};
 use crate::plan::{Plan, Run};
 use crate::record::Stream;
-use crate::row::{Layer, NodeRow};
+use crate::row::{Node, NodeRow};
 use crate::sheet::{Found, RowSheets, Sheet, Stretch};
-use crate::torn::{Mixed, SIDES_LOG2, Side};
-use crate::window::{TILE_LOG2, Tile};
+use crate::site::BLOCK_LOG2;
+use crate::torn::{Mixed, Side};
+use crate::window::Tile;
 use bytemuck::Pod;
 
 /// The caller's memory, cut up.
@@ -29,11 +30,8 @@ pub struct Workspace<'m> {
     pub charts: &'m mut [Chart],
     /// The keys, and what they are decoded with.
     pub stream: Stream<'m>,
-    /// The rows of nodes around the current row of cells: the one above that, its upper and its lower edge, the one below.
-    /// Where space is linear, only the inner two have room.
-    pub rows: [NodeRow<'m>; 4],
-    /// Where space is cubic, what lies halfway down the row of cells.
-    pub halfway: NodeRow<'m>,
+    /// The rows of nodes at the current row of cells' upper and lower edge, and the one below these, which has room only where space is cubic.
+    pub rows: [NodeRow<'m>; 3],
     /// The sheets of the current row of cells.
     pub sheets: RowSheets<'m>,
     /// What the current strip of it shows.
@@ -112,9 +110,8 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, space: &mut Workspace<'
     let fields = usize::from(limits.fields);
     let one_more = |count: usize| count.saturating_add(1);
     let cubic = bundle.path().space == SPACE_CUBIC;
-    let block_log2 = grid.log2.saturating_sub(cubic.into());
-    let blocks = grid.columns.saturating_mul(if cubic { 2 } else { 1 });
-    let tiles = grid.columns.checked_shl(grid.log2.saturating_sub(block_log2.min(TILE_LOG2))).unwrap_or(0);
+    // Blocks of a cell, from left to right.
+    let blocks = 1usize.wrapping_shl(grid.log2.saturating_sub(BLOCK_LOG2));
     let row_chains = usize::from(limits.row_chains);
     (space.palette, space.charts) = (cutter.take(bundle.texel_kind().colours()), cutter.take(bundle.label_count()));
     colours(space.palette, bundle, false);
@@ -140,32 +137,23 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, space: &mut Workspace<'
         *lists = Lists::new(rows, data).at_most(limits.cell_sheets);
     }
     stream.slots = slots;
-    let plain = space.backdrop.is_some_and(|backdrop| backdrop.plain());
-    // A row at one moment has its chains cut where either end of the interval ends one; halfway, where either row does.
-    let mut node_row = |row: &mut NodeRow<'m>, cuts: usize, fields: bool| {
-        row.chain = cutter.take::<Chain>(row_chains.saturating_mul(cuts).min(row_layers));
+    let still = space.backdrop.is_some();
+    for row in space.rows.iter_mut().take(if cubic { 3 } else { 2 }) {
+        // A row at one moment has its chains cut where either end of the interval ends one.
+        row.chain = cutter.take::<Chain>(row_chains.saturating_mul(2).min(row_layers));
         row.head = cutter.take(bundle.label_count());
-        row.layer = cutter.take::<Layer>(row_layers.saturating_mul(if cubic { 2 } else { 1 }));
-        row.field = cutter.take::<[i16; 2]>(if fields { row_layers } else { 0 });
-        row.cubic = cubic;
-        row.plain = plain;
-    };
-    for (place, row) in space.rows.iter_mut().enumerate() {
-        if cubic || place == 1 || place == 2 {
-            node_row(row, 2, fields > 0);
-        }
-    }
-    if cubic {
-        node_row(&mut space.halfway, 4, false);
+        row.node = cutter.take::<Node>(row_layers);
+        row.field = cutter.take::<[i16; 2]>(if fields > 0 { row_layers } else { 0 });
+        (row.bends, row.still) = (cubic, still);
     }
     let sheets = &mut space.sheets;
     (sheets.stretch, sheets.sheet) = (cutter.take::<Stretch>(grid.columns), cutter.take::<Sheet>(limits.row_sheets.into()));
     sheets.found = cutter.take::<Found>(bundle.label_count());
     let plan = &mut space.plan;
-    (plan.tile, plan.run, plan.mixed) = (cutter.take::<Tile>(tiles), cutter.take::<Run>(tiles), cutter.take::<Mixed>(blocks));
+    let places = grid.columns.saturating_mul(blocks);
+    (plan.tile, plan.run, plan.mixed) = (cutter.take::<Tile>(places), cutter.take::<Run>(places), cutter.take::<Mixed>(places));
     // A sheet shows in every block of its cell at most.
-    let sides = if block_log2 <= SIDES_LOG2 { usize::from(limits.row_sheets).wrapping_shl(cubic.into()) } else { 0 };
-    plan.side = cutter.take::<Side>(sides);
+    plan.side = cutter.take::<Side>(usize::from(limits.row_sheets).saturating_mul(blocks));
 }
 
 impl Bundle<'_> {

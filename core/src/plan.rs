@@ -5,14 +5,13 @@
 //! Blocks that show one sheet stand in **runs** of **tiles**, neighbours of one label whose positions lie in one window of the source image. Those
 //! that show more have a tile for each, and the pixels that show it.
 
-use crate::coverage::Bounds;
-use crate::fixed::PlayUv;
 use crate::key::BACKDROP;
-use crate::row::Layer;
-use crate::sheet::{Block, Corners, Sheet, Stretch};
+use crate::patch::Patch;
+use crate::row::{Layer, Node};
+use crate::sheet::{Sheet, Stretch};
 use crate::site::Site;
 use crate::torn::{self, Mixed, Side};
-use crate::window::{self, Room, Tile, Window};
+use crate::window::{self, Middle, Room, Tile, Window};
 
 /// Neighbouring tiles that show one sheet of one label, in caller's memory.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
@@ -54,7 +53,7 @@ pub struct Plan<'m> {
     pub sides: usize,
     /// Mixed blocks that are drawn pixel by pixel.
     pub plain: usize,
-    /// The row of tiles it is about, from the top of the screen; none: nothing yet.
+    /// The row of blocks it is about, from the top of the screen; none: nothing yet.
     pub strip: Option<u32>,
     /// How far around a position pixels are told from, Q16 texels.
     pub reach: i32,
@@ -68,20 +67,21 @@ pub struct Plan<'m> {
     pub tests: u32,
 }
 
+/// Curves of runs that are extended cell by cell bulge by at most this, Q16 texels: others are looked at one by one.
+const BULGE: i32 = 1 << 18;
+
 impl Plan<'_> {
-    /// Plans row `strip` of the screen's tiles, for pixels that are told from as far as `reach` around a position; `sideless`: all mixed blocks are
+    /// Plans row `strip` of the screen's blocks, for pixels that are told from as far as `reach` around a position; `sideless`: all mixed blocks are
     /// drawn pixel by pixel.
     #[inline(never)]
     pub fn make(&mut self, site: &Site<'_, '_, '_>, strip: u32, reach: i32, sideless: bool) {
         (self.tiles, self.runs, self.mixes, self.sides, self.plain) = (0, 0, 0, 0, 0);
         (self.smooth, self.torn, self.tests) = (0, 0, 0);
         (self.strip, self.reach, self.sideless) = (Some(strip), reach, sideless);
-        let texture = site.bundle.texture();
-        let room = Room::new(texture.width_log2, texture.height, window::margin(site.tile_log2()).wrapping_add(reach));
-        let (log2, width) = (site.log2(), site.bundle.size().0);
-        let parts_log2 = log2.wrapping_sub(site.tile_log2());
-        let (strip, part) = (strip.wrapping_shr(parts_log2), strip & 1u32.wrapping_shl(parts_log2).wrapping_sub(1));
-        let mut across = Across { site, room, strip, part, parts_log2, log2, width, left: 0, block: 0 };
+        let (texture, log2) = (site.bundle.texture(), site.block_log2());
+        let room = Room::new(texture.width_log2, texture.height, window::margin(log2).wrapping_add(reach));
+        let blocks = 1u32.wrapping_shl(site.log2().wrapping_sub(log2));
+        let mut across = Across { site, room, strip, log2, blocks, width: site.bundle.size().0, left: 0, block: 0 };
         for &stretch in site.sheets.stretches() {
             match site.sheets.of(stretch) {
                 [sheet] => self.smooth(&mut across, stretch, sheet),
@@ -93,80 +93,48 @@ impl Plan<'_> {
     /// Plans a stretch of cells that show one sheet.
     fn smooth(&mut self, across: &mut Across<'_, '_, '_>, stretch: Stretch, sheet: &Sheet) {
         let before = across.left;
-        self.cells(across, Mixed { sheet: stretch.sheet, sheets: 1, ..Mixed::default() }, sheet, stretch.cells);
-        self.smooth = self.smooth.wrapping_add(across.left.min(across.width).saturating_sub(before));
-    }
-
-    /// Plans so many `cells` that show `sheet` in this strip, and nothing else of what they have; `mixed` names it for the first of them.
-    fn cells(&mut self, across: &mut Across<'_, '_, '_>, mixed: Mixed, sheet: &Sheet, cells: u16) {
-        let Across { site, room, strip, width, .. } = *across;
-        let lines = site.lines(strip, sheet);
         let mut along = 0u16;
-        if site.plain(sheet) {
-            self.plain(across, across.blocks().wrapping_mul(cells.into()));
-            across.step(across.blocks().wrapping_mul(cells.into()));
-            return;
+        if across.site.plain(sheet) {
+            let blocks = across.blocks.wrapping_mul(stretch.cells.into());
+            self.plain(across, blocks);
+            across.step(blocks);
+            along = stretch.cells;
         }
-        while along < cells && across.left < width {
-            // In pictures 512 wide, as most are, and cells of eight pixels; others go by `append` alone. Likewise the cell that the screen's edge cuts.
-            let most = (width.saturating_sub(across.left) >> 3).min(cells.wrapping_sub(along).into());
-            if most > 0
-                && let Some(room) = &room
-                && (room.window == Window::USUAL || room.window == Window::NARROW)
-                && site.bundle.grid().log2 == 3
-            {
-                let rest = lines.map(|line| line.get(usize::from(along).wrapping_mul(across.blocks() as usize)..).unwrap_or(&[]));
-                let (block, label) = (across.block, sheet.label());
-                let extend = |plan: &mut Self| match (site.cubic(), room.window == Window::USUAL) {
-                    (true, true) => plan.extend::<9, 2, 2>(most as usize, room.margin, rest),
-                    (true, false) => plan.extend::<8, 2, 2>(most as usize, room.margin, rest),
-                    (false, true) => plan.extend::<9, 1, 3>(most as usize, room.margin, rest),
-                    (false, false) => plan.extend::<8, 1, 3>(most as usize, room.margin, rest),
-                };
-                let mut more = if self.follows(label, block) { extend(self) } else { 0 };
-                if more == 0
-                    && let [[a, b, ..], [c, d, ..]] = rest
-                    && self.begin(room, label, block, &[a.uv(), b.uv(), c.uv(), d.uv()])
-                {
-                    more = extend(self);
-                }
+        while along < stretch.cells && across.left < across.width {
+            // In pictures 512 and 256 wide, as most are, and cells of eight pixels; others go by `append` alone. Likewise the cell that the screen's edge
+            // cuts.
+            let most = (across.width.saturating_sub(across.left) >> 3).min(stretch.cells.wrapping_sub(along).into());
+            let more = if most > 0 && across.blocks == 1 && across.log2 == 3 { self.extend(across, sheet, along, most) } else { 0 };
+            if more > 0 {
                 along = along.wrapping_add(more);
-                across.step(across.blocks().wrapping_mul(more.into()));
-                if more > 0 {
-                    continue;
-                }
+                across.step(more.into());
+                continue;
             }
             let here = sheet.further(along);
-            for _ in 0..across.blocks() {
-                let place = across.place();
-                if !self.append(across, &here, place.corners(&here)) {
+            for _ in 0..across.blocks {
+                if !self.append(across, &here) {
+                    let mixed = Mixed { sheet: stretch.sheet, sheets: 1, ..Mixed::default() };
                     self.mix(across, Mixed { block: across.block as u16, along, ..mixed });
                 }
                 across.step(1);
             }
             along = along.wrapping_add(1);
         }
+        self.smooth = self.smooth.wrapping_add(across.left.min(across.width).saturating_sub(before));
     }
 
     /// Plans a cell that shows several sheets, or none.
     fn cell(&mut self, across: &mut Across<'_, '_, '_>, stretch: Stretch, sheets: &[Sheet]) {
         let before = across.left;
-        let [first, second] = torn::candidates(across.site, across.strip, sheets);
-        let mixed = |sheets: u16| Mixed { sheet: stretch.sheet, sheets, ..Mixed::default() };
-        let single = |shown: u16| sheets.get(shown.trailing_zeros() as usize).filter(|_| shown.is_power_of_two());
-        match single(first).filter(|_| first == second) {
-            Some(sheet) => self.cells(across, mixed(first), sheet, 1),
-            None => {
-                for shown in [first, second].into_iter().take(across.blocks() as usize) {
-                    let place = across.place();
-                    if !single(shown).is_some_and(|sheet| self.append(across, sheet, place.corners(sheet))) {
-                        self.mix(across, Mixed { block: across.block as u16, ..mixed(shown) });
-                        let pixels = across.width.saturating_sub(across.left).min(1 << across.log2);
-                        self.tests = self.tests.wrapping_add(pixels.wrapping_mul(shown.count_ones().saturating_sub(1)));
-                    }
-                    across.step(1);
-                }
+        for _ in 0..across.blocks {
+            let shown = torn::candidates(across.site, across.offset(), sheets);
+            let single = sheets.get(shown.trailing_zeros() as usize).filter(|_| shown.is_power_of_two());
+            if !single.is_some_and(|sheet| self.append(across, sheet)) {
+                self.mix(across, Mixed { block: across.block as u16, sheet: stretch.sheet, sheets: shown, ..Mixed::default() });
+                let pixels = across.width.saturating_sub(across.left).min(1 << across.log2);
+                self.tests = self.tests.wrapping_add(pixels.wrapping_mul(shown.count_ones().saturating_sub(1)));
             }
+            across.step(1);
         }
         let pixels = across.left.min(across.width).saturating_sub(before);
         let kind = if sheets.is_empty() { &mut self.smooth } else { &mut self.torn };
@@ -180,59 +148,48 @@ impl Plan<'_> {
         run.is_some_and(|run| run.label == u16::from(label) && u32::from(run.place).wrapping_add(u32::from(run.count)) == place)
     }
 
-    /// Begins a run of no tiles yet, in a window that holds the tile of these corners; false where there is none.
+    /// Begins a run of no tiles yet, in a window that holds `patch`, and `more` than that where it can; false where there is none.
     #[inline(never)]
-    fn begin(&mut self, room: &Room, label: u8, place: u32, corners: &Corners) -> bool {
-        let Some(row) = room.onwards(corners) else { return false };
+    fn begin(&mut self, room: &Room, label: u8, place: u32, patch: &Patch, more: i32) -> bool {
+        let Some(row) = room.onwards(patch, more) else { return false };
         let Some(run) = self.run.get_mut(self.runs) else { return false };
         *run = Run { place: place as u16, count: 0, tile: self.tiles as u16, row, label: label.into() };
         self.runs = self.runs.wrapping_add(1);
         true
     }
 
-    /// Appends smooth cells to the last run, which they follow, as long as they fit into its window, `most` at most; returns how many. `above` and
-    /// `below` start at their left corners: between each two of these is a tile of 2^LOG2 pixels, TILES a cell.
+    /// Appends smooth cells of `sheet`, from the `along`-th of its stretch on, to a run, `most` at most; returns how many.
+    fn extend(&mut self, across: &Across<'_, '_, '_>, sheet: &Sheet, along: u16, most: u32) -> u16 {
+        let Some(room) = &across.room else { return 0 };
+        let ([top, bottom], [above, below]) = (across.site.rows, sheet.further(along).nodes());
+        let lines = [top.from(above), bottom.from(below)];
+        let grow = |plan: &mut Self| match room.window {
+            Window::USUAL => plan.grow::<9>(most as usize, room.margin, lines),
+            Window::NARROW => plan.grow::<8>(most as usize, room.margin, lines),
+            _ => 0,
+        };
+        let mut more = if self.follows(sheet.label(), across.block) { grow(self) } else { 0 };
+        if more == 0 && self.begin(room, sheet.label(), across.block, &across.site.block(&sheet.further(along), [0; 2]), BULGE) {
+            more = grow(self);
+        }
+        more
+    }
+
+    /// Appends cells of eight pixels to the last run, which they follow, as long as they fit into its window, `most` at most; returns how many. The
+    /// `lines` above and below start at their left corners.
     #[inline(never)]
-    fn extend<const WIDTH: u32, const TILES: usize, const LOG2: u32>(
-        &mut self,
-        most: usize,
-        margin: i32,
-        [above, below]: [&[Layer]; 2],
-    ) -> u16 {
+    fn grow<const WIDTH: u32>(&mut self, most: usize, margin: i32, lines: [&[Node]; 2]) -> u16 {
         let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return 0 };
         let Some(slots) = self.tile.get_mut(self.tiles..) else { return 0 };
-        let Some(slots) = slots.get_mut(..most.wrapping_mul(TILES)) else { return 0 };
+        let Some(slots) = slots.get_mut(..most) else { return 0 };
         let window = Window { width_log2: WIDTH, ..Window::USUAL };
-        // From the window's corner, and the margin on from there: inside is what is not negative and below the room, one comparison for both.
-        let corner = PlayUv { u: margin, v: margin.wrapping_add(i32::from(run.row).wrapping_shl(16)) };
-        let room = |log2: u32| 1u32.wrapping_shl(log2.wrapping_add(16)).wrapping_sub((margin as u32).wrapping_mul(2));
-        let (across, down) = (room(window.width_log2), room(window.rows_log2));
-        let margins = window.pack(margin, margin, 0);
-        let mut ends = above.iter().zip(below).map(|(above, below)| [above.uv(), below.uv()].map(|uv| uv.less(corner)));
-        let Some([mut a, mut c]) = ends.next() else { return 0 };
-        let mut done = 0usize;
-        for (slot, [b, d]) in slots.iter_mut().zip(ends) {
-            if b.u as u32 >= across || d.u as u32 >= across || b.v as u32 >= down || d.v as u32 >= down {
-                break;
-            }
-            let (right, left, below) = (b.less(a), c.less(a), d.less(c));
-            let turn = below.less(right);
-            *slot = Tile {
-                // The margin is a multiple of what positions are rounded to.
-                at: window.pack(a.u, a.v, 0).wrapping_add(margins),
-                step: window.pack(right.u, right.v, LOG2),
-                down: window.pack(left.u, left.v, LOG2),
-                turn: window.pack(turn.u, turn.v, LOG2.wrapping_mul(2)),
-            };
-            (a, c) = (b, d);
-            done = done.wrapping_add(1);
-        }
-        // Half a cell is for `append`, which finds the same.
-        let cells = if TILES == 1 { done } else { done >> 1 };
-        let done = cells.wrapping_mul(TILES);
+        let margin = margin.wrapping_add(BULGE);
+        // An axis after the other: what is known of both at a time would not fit a small processor's registers.
+        let done = lay::<true>(slots, lines, i32::from(run.row).wrapping_shl(16), margin, window);
+        let done = lay::<false>(slots.get_mut(..done).unwrap_or(&mut []), lines, 0, margin, window);
         run.count = run.count.wrapping_add(done as u16);
         self.tiles = self.tiles.wrapping_add(done);
-        cells as u16
+        done as u16
     }
 
     /// Adds a block that no run has, with its sides where it has such.
@@ -247,38 +204,33 @@ impl Plan<'_> {
         }
     }
 
-    /// Appends the block at `across`, which shows one sheet, to the last run, or begins others; false where its positions fit no window. What was
-    /// appended then is drawn over.
+    /// Appends the block at `across`, which shows one sheet, to the last run, or begins another; false where its positions fit no window.
     #[inline(never)]
-    fn append(&mut self, across: &Across<'_, '_, '_>, sheet: &Sheet, [a, b, c, d]: Corners) -> bool {
+    fn append(&mut self, across: &Across<'_, '_, '_>, sheet: &Sheet) -> bool {
         if across.site.plain(sheet) {
             return self.plain(across, 1);
         }
         let Some(room) = &across.room else { return false };
-        let label = sheet.label();
-        let log2 = across.parts_log2;
-        if log2 == 0 {
-            return self.tile(across, room, label, across.block, [a, b, c, d]);
+        if self.tiles >= self.tile.len() {
+            return false;
         }
-        // The row of the block's tiles, then one after the other.
-        let between = |from: PlayUv, to: PlayUv, part: u32| {
-            // Positions differ by less than 2^28.6, and a block has at most four tiles a side.
-            let along = |from: i32, to: i32| from.wrapping_add(to.wrapping_sub(from).wrapping_mul(part as i32) >> log2);
-            PlayUv { u: along(from.u, to.u), v: along(from.v, to.v) }
-        };
-        let next = across.part.wrapping_add(1);
-        let [a, c] = [between(a, c, across.part), between(a, c, next)];
-        let [b, d] = [between(b, d, across.part), between(b, d, next)];
-        (0..1u32.wrapping_shl(log2)).all(|part| {
-            let corners =
-                [between(a, b, part), between(a, b, part.wrapping_add(1)), between(c, d, part), between(c, d, part.wrapping_add(1))];
-            self.tile(across, room, label, across.block.wrapping_shl(log2).wrapping_add(part), corners)
-        })
+        let (label, patch) = (sheet.label(), across.site.block(sheet, across.offset()));
+        let inside = |run: &Run| room.holds(&patch.bounds(), run.row);
+        let stays = self.follows(label, across.block) && self.run.get(self.runs.wrapping_sub(1)).is_some_and(inside);
+        if !(stays || self.begin(room, label, across.block, &patch, 0)) {
+            return false;
+        }
+        let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return false };
+        let Some(slot) = self.tile.get_mut(self.tiles) else { return false };
+        *slot = room.window.tile(&patch, run.row, across.log2);
+        run.count = run.count.wrapping_add(1);
+        self.tiles = self.tiles.wrapping_add(1);
+        true
     }
 
     /// Appends so many `blocks` of the backdrop's one colour to the last run, or begins another.
     fn plain(&mut self, across: &Across<'_, '_, '_>, blocks: u32) -> bool {
-        let [place, count] = [across.block, blocks].map(|blocks| blocks.wrapping_shl(across.parts_log2) as u16);
+        let [place, count] = [across.block, blocks].map(|blocks| blocks as u16);
         if let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1))
             && run.tile == PLAIN
             && run.place.wrapping_add(run.count) == place
@@ -291,25 +243,39 @@ impl Plan<'_> {
         self.runs = self.runs.wrapping_add(1);
         true
     }
+}
 
-    /// Appends the tile at `place` to the last run, or begins another; false where its positions fit no window.
-    fn tile(&mut self, across: &Across<'_, '_, '_>, room: &Room, label: u8, place: u32, corners: Corners) -> bool {
-        let log2 = across.log2.wrapping_sub(across.parts_log2);
-        if self.tiles >= self.tile.len() {
-            return false;
+/// Fills `slots` with v (`DOWN`), or adds u, of tiles of eight pixels between nodes above and below, as long as they lie a `margin` inside the window,
+/// which begins at `first`; returns how many do.
+#[inline(always)]
+fn lay<const DOWN: bool>(slots: &mut [Tile], [above, below]: [&[Node]; 2], first: i32, margin: i32, window: Window) -> usize {
+    let one = |layer: Layer| if DOWN { layer.uv().v } else { layer.uv().u };
+    let log2 = if DOWN { window.rows_log2 } else { window.width_log2 };
+    // From the margin on: inside is what is not negative and below the room, one comparison for both.
+    let room = 1u32.wrapping_shl(log2.wrapping_add(16)).wrapping_sub((margin as u32).wrapping_mul(2));
+    let corner = first.wrapping_add(margin);
+    let mut edges = above.iter().zip(below);
+    let at = |node: &Node| one(node.layer).wrapping_sub(corner);
+    let sums =
+        |above: &Node, below: &Node| [one(above.across).wrapping_add(one(below.across)), one(above.down).wrapping_add(one(below.down))];
+    let Some((above, below)) = edges.next() else { return 0 };
+    let ([mut a, mut c], mut left) = ([at(above), at(below)], sums(above, below));
+    let mut done = 0usize;
+    for (slot, (above, below)) in slots.iter_mut().zip(edges) {
+        let ([b, d], right) = ([at(above), at(below)], sums(above, below));
+        let bends = [left[0].wrapping_add(right[0]), left[1].wrapping_add(right[1])];
+        // It bulges by a 32nd of each.
+        const MOST: u32 = (BULGE as u32) << 4;
+        let bulges = (bends[0] as u32).wrapping_add(MOST) | (bends[1] as u32).wrapping_add(MOST);
+        if b as u32 >= room || d as u32 >= room || bulges >= 2 * MOST {
+            break;
         }
-        let inside = |run: &Run| room.holds(&Bounds::around(&corners), run.row);
-        let stays = self.follows(label, place) && self.run.get(self.runs.wrapping_sub(1)).is_some_and(inside);
-        if !(stays || self.begin(room, label, place, &corners)) {
-            return false;
-        }
-        let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return false };
-        let Some(slot) = self.tile.get_mut(self.tiles) else { return false };
-        *slot = room.window.tile(corners, run.row, log2);
-        run.count = run.count.wrapping_add(1);
-        self.tiles = self.tiles.wrapping_add(1);
-        true
+        let tile = Middle::new([a, b, c, d], bends, 3).plus(margin).lanes(3, |x, log2| window.lane::<DOWN>(x, log2));
+        *slot = if DOWN { tile } else { slot.plus(&tile).from_middle(3) };
+        (a, c, left) = (b, d, right);
+        done = done.wrapping_add(1);
     }
+    done
 }
 
 /// How far a strip is planned.
@@ -318,10 +284,10 @@ struct Across<'s, 'a, 'm> {
     site: &'s Site<'s, 'a, 'm>,
     room: Option<Room>,
     strip: u32,
-    /// The row of tiles in the strip, and how many the strip has: 2^`parts_log2`.
-    part: u32,
-    parts_log2: u32,
+    /// A block is 2^this pixels wide.
     log2: u32,
+    /// Blocks of a cell, from left to right.
+    blocks: u32,
     /// The screen's width, and pixels to the left of the next block.
     width: u32,
     left: u32,
@@ -330,13 +296,9 @@ struct Across<'s, 'a, 'm> {
 }
 
 impl Across<'_, '_, '_> {
-    /// Blocks of a cell, from left to right.
-    fn blocks(&self) -> u32 {
-        if self.site.cubic() { 2 } else { 1 }
-    }
-
-    fn place(&self) -> Block<'_, '_> {
-        self.site.block(self.block, self.strip)
+    /// How far the next block is from its cell's left upper corner, pixels.
+    fn offset(&self) -> [u32; 2] {
+        self.site.offset(self.block, self.strip)
     }
 
     /// On by so many blocks.

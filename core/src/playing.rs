@@ -10,7 +10,7 @@ use crate::key::Nothing;
 use crate::memory::{self, Workspace};
 use crate::pack::{Picture, Scratch};
 use crate::record::{BYTE_COST, Place, Shape};
-use crate::row::Around;
+use crate::row::{Around, NodeRow};
 use crate::timeline::Moment;
 use crate::work::{Probe, Work};
 
@@ -272,7 +272,7 @@ impl<'a> Playing<'a> {
         let age = self.needed().ahead;
         let bundle = self.bundle;
         let from = self.moment.interval as isize;
-        let Workspace { stream, rows, halfway, sheets, backdrop, .. } = &mut self.space;
+        let Workspace { stream, rows, sheets, backdrop, .. } = &mut self.space;
         let at = |offset: isize| {
             let inside = bundle.looping() || (0..bundle.key_count() as isize).contains(&from.wrapping_add(offset));
             stream.key(age.checked_add_signed(offset.wrapping_neg())?).filter(|_| inside)
@@ -289,31 +289,34 @@ impl<'a> Playing<'a> {
             backdrop: backdrop.as_ref(),
         };
         let cubic = bundle.path().space == SPACE_CUBIC;
+        let mut fill = |nodes: &mut NodeRow<'_>, at: Option<usize>| {
+            let layers = nodes.fill(grid, at, &around, &self.moment);
+            self.work.layers = self.work.layers.wrapping_add(layers);
+        };
+        let [top, bottom, below] = rows;
         // Going down, the rows of nodes around the last row of cells are those around this one, but for the lowest.
         let down = row > 0 && self.loaded == Some(row.wrapping_sub(1));
-        let known = match (down, cubic) {
-            (false, _) => 0,
-            (true, true) => 3,
-            (true, false) => 2,
-        };
-        match rows {
-            [_, top, bottom, _] if down && !cubic => core::mem::swap(top, bottom),
-            _ if down => rows.rotate_left(1),
-            _ => {}
-        }
-        for (place, nodes) in rows.iter_mut().enumerate().skip(known) {
-            // The second row of the four is the row of cells' upper edge; the outer two are for the middles alone.
-            if cubic || place == 1 || place == 2 {
-                let layers = nodes.fill(grid, row.wrapping_add(place).checked_sub(1), &around, &self.moment);
-                self.work.layers = self.work.layers.wrapping_add(layers);
-            }
-        }
-        let [before, top, bottom, after] = &*rows;
         if cubic {
-            let layers = halfway.between([before, top, bottom, after]);
-            self.work.middles = self.work.middles.wrapping_add(layers);
+            if !down {
+                // How the upper edge bends takes the row above it, which is gone then.
+                fill(top, row.checked_sub(1));
+                fill(bottom, Some(row));
+                fill(below, Some(row.wrapping_add(1)));
+                bottom.bend_down(top, below);
+            }
+            core::mem::swap(top, bottom);
+            core::mem::swap(bottom, below);
+            fill(below, Some(row.wrapping_add(2)));
+            bottom.bend_down(top, below);
+        } else {
+            if down {
+                core::mem::swap(top, bottom);
+            } else {
+                fill(top, Some(row));
+            }
+            fill(bottom, Some(row.wrapping_add(1)));
         }
-        sheets.fill(grid, row, lists, [top, halfway, bottom], cubic);
+        sheets.fill(grid, row, lists, [top, bottom]);
         self.loaded = Some(row);
         true
     }

@@ -1,14 +1,14 @@
-//! A row of nodes at one moment: its layers interpolated in time, or halfway between two such rows.
+//! A row of nodes at one moment: its layers interpolated in time, and how they bend from node to node.
 //! Keys come from the caller's memory, rows go to `sheet`.
 
-use crate::fixed::{KEY_MIN, KeyUv, ONE, PLAY_BITS, PlayUv, WEIGHT_BITS, field_distance, middle};
+use crate::fixed::{KEY_MIN, KeyUv, ONE, PLAY_BITS, PlayUv, WEIGHT_BITS, field_distance};
 use crate::format::LabelRecord;
 use crate::grid::Grid;
 use crate::key::{self, BACKDROP, Chain, Key, NONE};
 use crate::timeline::{Moment, Weights};
 
 /// A layer at one moment: a [`PlayUv`] in caller's memory.
-#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Layer {
     u: i32,
@@ -16,28 +16,42 @@ pub struct Layer {
 }
 
 impl Layer {
+    const ZERO: Self = Self { u: 0, v: 0 };
+
     /// The position.
     #[must_use]
+    #[inline(always)]
     pub const fn uv(self) -> PlayUv {
         PlayUv { u: self.u, v: self.v }
     }
 
-    /// Halfway between `from` and `to`, given what comes before and after on the same line (see [`middle`]).
-    #[must_use]
-    #[inline]
-    pub const fn middle(before: Option<Self>, from: Self, to: Self, after: Option<Self>) -> Self {
-        // One decision for both axes.
-        match (before, after) {
-            (Some(b), Some(a)) => Self { u: middle(Some(b.u), from.u, to.u, Some(a.u)), v: middle(Some(b.v), from.v, to.v, Some(a.v)) },
-            (Some(b), None) => Self { u: middle(Some(b.u), from.u, to.u, None), v: middle(Some(b.v), from.v, to.v, None) },
-            (None, Some(a)) => Self { u: middle(None, from.u, to.u, Some(a.u)), v: middle(None, from.v, to.v, Some(a.v)) },
-            (None, None) => Self { u: middle(None, from.u, to.u, None), v: middle(None, from.v, to.v, None) },
-        }
+    /// The second difference of three on a line, of which `here` is the middle one.
+    #[inline(always)]
+    fn bend(before: Self, here: Self, after: Self) -> Self {
+        let second = |a: i32, b: i32, c: i32| a.wrapping_sub(b).wrapping_add(c.wrapping_sub(b));
+        Self { u: second(before.u, here.u, after.u), v: second(before.v, here.v, after.v) }
     }
 }
 
-/// Where space is cubic, a layer and what is halfway to the next one of its chain.
-type Pair = [Layer; 2];
+/// A layer at its node and how it bends there, in caller's memory. Second differences of positions, Q15.16 texels: where it has no neighbour on one
+/// side, those of the one on the other; none where space is linear.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Node {
+    /// Where it is.
+    pub layer: Layer,
+    /// The second difference of those to the left and to the right.
+    pub across: Layer,
+    /// Of those above and below.
+    pub down: Layer,
+}
+
+impl Node {
+    const NOWHERE: Self = Self { layer: Layer::ZERO, across: Layer::ZERO, down: Layer::ZERO };
+}
+
+/// [`Node::down`] where there is no row above: the next row tells.
+const UNTOLD: Layer = Layer { u: i32::MIN, v: i32::MIN };
 
 /// The keys around a moment.
 #[derive(Clone, Copy, Debug)]
@@ -81,13 +95,12 @@ fn straight<'s>(slots: impl Iterator<Item = &'s mut i16>, from: &[i8], to: &[i8]
     }
 }
 
-/// Fills every EVERY-th of `slots`, from the first on, with what `four` keys' positions make with these `weights`.
+/// Fills `slots` with what `four` keys' positions make with these `weights`.
 #[inline(never)]
-fn blend_all<const EVERY: usize>(slots: &mut [Layer], [a, b, c, d]: [&[u32]; 4], weights: Weights, key_bits: u32) {
-    let slots = slots.as_chunks_mut::<EVERY>().0.iter_mut().filter_map(|slots| slots.first_mut());
+fn blend_all(slots: &mut [Node], [a, b, c, d]: [&[u32]; 4], weights: Weights, key_bits: u32) {
     let keys = a.iter().zip(b).zip(c.iter().zip(d));
-    for (slot, ((&a, &b), (&c, &d))) in slots.zip(keys) {
-        *slot = blend([KeyUv(a), KeyUv(b), KeyUv(c), KeyUv(d)], weights, key_bits);
+    for (slot, ((&a, &b), (&c, &d))) in slots.iter_mut().zip(keys) {
+        slot.layer = blend([KeyUv(a), KeyUv(b), KeyUv(c), KeyUv(d)], weights, key_bits);
     }
 }
 
@@ -132,14 +145,11 @@ impl<'k> Beside<'k> {
         None
     }
 
-    /// Where in `of` the layers of `label` from node `column` on stand, and the node where that ends: that they do, or that there are none.
+    /// Where the layers of `label` from node `column` on stand, and the node where that ends: that they do, or that there are none.
     #[inline(always)]
-    fn part<T>(&mut self, of: &'k [T], label: u16, column: u16) -> (Option<&'k [T]>, u16) {
+    fn part(&mut self, label: u16, column: u16) -> (Option<usize>, u16) {
         match self.from(label, column) {
-            Some(chain) if chain.first <= column => {
-                let from = usize::from(chain.at.wrapping_add(column.wrapping_sub(chain.first)));
-                (of.get(from..), chain.end)
-            }
+            Some(chain) if chain.first <= column => (Some(chain.along(column)), chain.end),
             Some(chain) => (None, chain.first),
             None => (None, NONE),
         }
@@ -155,12 +165,12 @@ pub struct NodeRow<'m> {
     pub chains: usize,
     /// The first chain of every label; [`NONE`]: there is none. The others follow it, from left to right.
     pub head: &'m mut [u16],
-    /// Positions, Q15.16 texels, chain by chain; where space is cubic, each followed by what is halfway to the next one of its chain.
-    pub layer: &'m mut [Layer],
-    /// Space is cubic.
-    pub cubic: bool,
-    /// The backdrop is one position: nothing has to be worked out halfway.
-    pub plain: bool,
+    /// The layers, chain by chain.
+    pub node: &'m mut [Node],
+    /// Space is cubic: layers bend.
+    pub bends: bool,
+    /// There is a backdrop, which bends nowhere.
+    pub still: bool,
     /// Fields, Q8 pixels; empty where the bundle has none.
     pub field: &'m mut [[i16; 2]],
 }
@@ -175,8 +185,7 @@ impl NodeRow<'_> {
     #[inline(always)]
     fn open(&mut self, label: u16, first: u16, end: u16, at: usize) -> Option<Chain> {
         let chain = Chain { first, end, at: at as u16, field: NONE, label };
-        let held = self.layer.len().wrapping_shr(self.cubic.into());
-        let room = at.wrapping_add(chain.nodes().into()) <= held.min(usize::from(NONE));
+        let room = at.wrapping_add(chain.nodes().into()) <= self.node.len().min(usize::from(NONE));
         let slot = self.chain.get_mut(self.chains).filter(|_| room)?;
         let head = self.head.get_mut(usize::from(label))?;
         *slot = chain;
@@ -213,24 +222,23 @@ impl NodeRow<'_> {
                 }
             }
         }
-        self.halve();
+        self.bend_across();
         count as u32
     }
 
     /// Fills in the layers of the backdrop's `chain`, which stands still.
     #[inline(never)]
     fn stand(&mut self, chain: Chain, record: &LabelRecord, grid: Grid, row: usize, key_bits: u32) {
-        let (plain, every) = (self.plain, if self.cubic { 2 } else { 1 });
         let slots = self.of(&chain);
         let layer = |column: u16| {
             let PlayUv { u, v } = key::backdrop(record, [column, row as u16], grid.log2, key_bits);
-            Layer { u, v }
+            Node { layer: Layer { u, v }, ..Node::NOWHERE }
         };
-        if plain {
+        if record.plain() {
             slots.fill(layer(0));
             return;
         }
-        for (slot, column) in slots.iter_mut().step_by(every).zip(chain.first..) {
+        for (slot, column) in slots.iter_mut().zip(chain.first..) {
             *slot = layer(column);
         }
     }
@@ -246,30 +254,26 @@ impl NodeRow<'_> {
         [before, after]: [&mut Beside<'k>; 2],
     ) {
         let [both, no_first, no_last, neither] = &moment.weights;
-        let cubic = self.cubic;
         let mut slots = self.of(&chain);
-        let layers = |key: &Key<'_>, of: &Chain| usize::from(of.at.wrapping_add(chain.first.wrapping_sub(of.first))).min(key.uv.len());
-        let mut from = keys.from.uv.get(layers(keys.from, start)..).unwrap_or(&[]);
-        let mut to = keys.to.uv.get(layers(keys.to, end)..).unwrap_or(&[]);
+        let layers = |key: &'k Key<'_>, at: usize| key.uv.get(at..).unwrap_or(&[]);
+        let mut from = layers(keys.from, start.along(chain.first));
+        let mut to = layers(keys.to, end.along(chain.first));
         let mut column = chain.first;
         while !slots.is_empty() {
-            let (first, high) = before.part(keys.before.map_or(&[], |key| &*key.uv), chain.label, column);
-            let (last, low) = after.part(keys.after.map_or(&[], |key| &*key.uv), chain.label, column);
+            let (first, high) = before.part(chain.label, column);
+            let (last, low) = after.part(chain.label, column);
             let stop = chain.end.min(high).min(low);
-            let nodes = usize::from(stop.wrapping_sub(column)).min(slots.len().wrapping_shr(cubic.into()));
+            let (some, others) = slots.split_at_mut(usize::from(stop.wrapping_sub(column)).min(slots.len()));
             let weights = match (first, last) {
                 (Some(_), Some(_)) => both,
                 (None, Some(_)) => no_first,
                 (Some(_), None) => no_last,
                 (None, None) => neither,
             };
-            let (some, others) = slots.split_at_mut(nodes.wrapping_shl(cubic.into()).min(slots.len()));
-            let four = [first.unwrap_or(from), from, to, last.unwrap_or(to)];
-            if cubic {
-                blend_all::<2>(some, four, *weights, keys.key_bits);
-            } else {
-                blend_all::<1>(some, four, *weights, keys.key_bits);
-            }
+            let outer = |key: Option<&'k Key<'_>>, at: Option<usize>| Some(layers(key?, at?));
+            let four = [outer(keys.before, first).unwrap_or(from), from, to, outer(keys.after, last).unwrap_or(to)];
+            let nodes = some.len();
+            blend_all(some, four, *weights, keys.key_bits);
             (slots, column) = (others, stop);
             (from, to) = (from.get(nodes..).unwrap_or(&[]), to.get(nodes..).unwrap_or(&[]));
             // A chain of no nodes, which only a broken bundle has, ends the row.
@@ -299,81 +303,84 @@ impl NodeRow<'_> {
         straight(slots.iter_mut().map(|[_, field]| field), b, d, linear);
     }
 
-    /// Fills the row with what lies halfway between rows `from` and `to`, where both carry it; `before` and `after` are the rows
-    /// around these. Space is cubic. Returns how many layers there are.
-    #[inline(never)]
-    pub fn between(&mut self, rows: [&NodeRow<'_>; 4]) -> u32 {
-        self.clear();
-        let [mut above, from, mut lower, mut below] = rows.map(NodeRow::chains);
-        let [before, upper, bottom, after] = rows.map(NodeRow::pairs);
-        let plain = self.plain;
-        let mut count = 0usize;
-        for start in from.chains {
-            let mut column = start.first;
-            while let Some(end) = lower.from(start.label, column).filter(|end| end.first < start.end) {
-                let (first, stop) = (column.max(end.first), start.end.min(end.end));
-                let Some(chain) = self.open(start.label, first, stop, count) else { return count as u32 };
-                let mut slots = self.of(&chain).as_chunks_mut::<2>().0;
-                count = count.wrapping_add(slots.len());
-                column = first;
-                if plain && chain.label == BACKDROP {
-                    slots.fill(upper.get(usize::from(start.at)).copied().unwrap_or_default());
-                    slots = &mut [];
-                }
-                let mut here = cut(start, upper, first);
-                let mut there = cut(end, bottom, first);
-                while !slots.is_empty() {
-                    let (high, top) = above.part(before, chain.label, column);
-                    let (low, end) = below.part(after, chain.label, column);
-                    let next = stop.min(top).min(end);
-                    let length = usize::from(next.wrapping_sub(column));
-                    let (some, rest) = slots.split_at_mut(slots.len().min(length));
-                    let Some(((a, here_rest), (b, there_rest))) = here.split_at_checked(length).zip(there.split_at_checked(length)) else {
-                        break;
-                    };
-                    middles(some, a, b, high, low);
-                    (slots, here, there, column) = (rest, here_rest, there_rest, next);
-                    if length == 0 {
-                        break;
-                    }
-                }
-                column = stop;
-                if column >= start.end {
-                    break;
-                }
-            }
-        }
-        self.halve();
-        count as u32
-    }
-
-    fn chains(&self) -> Beside<'_> {
+    fn beside(&self) -> Beside<'_> {
         Beside { chains: self.chain.get(..self.chains).unwrap_or(&[]) }
     }
 
-    /// Works out what lies halfway between each layer and the next one of its chain, where that is wanted.
+    /// Works out how each layer bends across; how it bends down is left to [`NodeRow::bend_down`].
     #[inline(never)]
-    fn halve(&mut self) {
-        if !self.cubic {
-            return;
-        }
-        let mut points = self.layer.as_chunks_mut::<2>().0;
+    fn bend_across(&mut self) {
+        let mut nodes = &mut *self.node;
         for chain in self.chain.get(..self.chains).unwrap_or(&[]) {
-            let Some((mine, rest)) = points.split_at_mut_checked(chain.nodes().into()) else { break };
-            points = rest;
-            if self.plain && chain.label == BACKDROP {
+            let Some((mine, rest)) = core::mem::take(&mut nodes).split_at_mut_checked(chain.nodes().into()) else { break };
+            nodes = rest;
+            if self.still && chain.label == BACKDROP {
                 continue;
             }
-            // Each point waits for two more.
-            let mut mine = mine.iter_mut();
-            let (Some(mut last), Some(mut here)) = (mine.next(), mine.next()) else { continue };
-            let mut before = None;
-            for next in mine {
-                last[1] = Layer::middle(before, last[0], here[0], Some(next[0]));
-                before = Some(last[0]);
-                (last, here) = (here, next);
+            let (across, down) = (Layer::ZERO, if self.bends { UNTOLD } else { Layer::ZERO });
+            let [first, second, rest @ ..] = mine else {
+                mine.iter_mut().for_each(|node| *node = Node { across, down, ..*node });
+                continue;
+            };
+            // Each waits for the next one; the first bends as the second does, the last as the one before it.
+            (first.across, first.down) = (across, down);
+            let (mut before, mut here, mut bend) = (first.layer, second, across);
+            for after in rest {
+                if self.bends {
+                    bend = Layer::bend(before, here.layer, after.layer);
+                }
+                (before, here.across, here.down) = (here.layer, bend, down);
+                here = after;
             }
-            last[1] = Layer::middle(before, last[0], here[0], None);
+            (here.across, here.down) = (bend, down);
+            if let [first, second, ..] = mine {
+                first.across = second.across;
+            }
+        }
+    }
+
+    /// Works out how each layer bends down, given the rows above and below it; where the one above had none above itself, it bends as this one does.
+    #[inline(never)]
+    pub fn bend_down(&mut self, above: &mut Self, below: &Self) {
+        let (mut uppers, mut lowers) = (Beside { chains: above.chain.get(..above.chains).unwrap_or(&[]) }, below.beside());
+        for chain in self.chain.get(..self.chains).unwrap_or(&[]) {
+            if self.still && chain.label == BACKDROP {
+                continue;
+            }
+            let mut column = chain.first;
+            while column < chain.end {
+                let (high, top) = uppers.part(chain.label, column);
+                let (low, bottom) = lowers.part(chain.label, column);
+                let stop = chain.end.min(top).min(bottom);
+                let (at, nodes) = (chain.along(column), usize::from(stop.wrapping_sub(column)));
+                let here = self.node.get_mut(at..).and_then(|all| all.get_mut(..nodes)).unwrap_or(&mut []);
+                // Where there is none above, the next row tells.
+                if let Some(upper) = high.and_then(|high| above.node.get_mut(high..)) {
+                    match low.and_then(|low| below.node.get(low..)) {
+                        Some(lower) => {
+                            for ((here, upper), lower) in here.iter_mut().zip(upper).zip(lower) {
+                                here.down = Layer::bend(upper.layer, here.layer, lower.layer);
+                                if upper.down == UNTOLD {
+                                    upper.down = here.down;
+                                }
+                            }
+                        }
+                        None => {
+                            for (here, upper) in here.iter_mut().zip(upper) {
+                                if upper.down == UNTOLD {
+                                    upper.down = Layer::ZERO;
+                                }
+                                here.down = upper.down;
+                            }
+                        }
+                    }
+                }
+                // Only broken bundles have chains of no nodes.
+                if stop <= column {
+                    break;
+                }
+                column = stop;
+            }
         }
     }
 
@@ -400,72 +407,26 @@ impl NodeRow<'_> {
         self.field.get(usize::from(index)..).and_then(<[_]>::first_chunk).copied().unwrap_or([[1, 1]; 2])
     }
 
-    /// Layer `index` and the next one of its chain, where space is linear.
+    /// Layer `index` and the next one of its chain.
     #[must_use]
     #[inline(always)]
-    pub fn ends(&self, index: u16) -> &[Layer; 2] {
-        const NONE: &[Layer; 2] = &[Layer { u: 0, v: 0 }; 2];
-        self.layer.get(usize::from(index)..).and_then(<[_]>::first_chunk).unwrap_or(NONE)
-    }
-
-    /// Layer `index`, what is halfway to the next one of its chain, and that one, where space is cubic.
-    #[must_use]
-    #[inline(always)]
-    pub fn thirds(&self, index: u16) -> &[Layer; 3] {
-        const NONE: &[Layer; 3] = &[Layer { u: 0, v: 0 }; 3];
-        self.layer.get(usize::from(index).wrapping_mul(2)..).and_then(<[_]>::first_chunk).unwrap_or(NONE)
+    pub fn ends(&self, index: u16) -> &[Node; 2] {
+        const NONE: &[Node; 2] = &[Node::NOWHERE; 2];
+        self.from(index).first_chunk().unwrap_or(NONE)
     }
 
     /// Layer `index` and all that come after it, as they stand.
     #[must_use]
-    pub fn from(&self, index: u16) -> &[Layer] {
-        self.layer.get(usize::from(index).wrapping_shl(self.cubic.into())..).unwrap_or(&[])
+    #[inline(always)]
+    pub fn from(&self, index: u16) -> &[Node] {
+        self.node.get(usize::from(index)..).unwrap_or(&[])
     }
 
     /// The slots of `chain`.
     #[inline(always)]
-    fn of(&mut self, chain: &Chain) -> &mut [Layer] {
-        let log2 = u32::from(self.cubic);
-        let slots = self.layer.get_mut(usize::from(chain.at).wrapping_shl(log2)..).unwrap_or(&mut []);
-        slots.get_mut(..usize::from(chain.nodes()).wrapping_shl(log2)).unwrap_or(&mut [])
-    }
-
-    /// Where space is cubic, each layer and what is halfway to the next one.
-    fn pairs(&self) -> &[Pair] {
-        self.layer.as_chunks().0
-    }
-}
-
-/// The layers of `chain` from node `column` on, which it has.
-fn cut<'l>(chain: &Chain, points: &'l [Pair], column: u16) -> &'l [Pair] {
-    let all = points.get(usize::from(chain.at)..).and_then(|points| points.get(..chain.nodes().into())).unwrap_or(&[]);
-    all.get(usize::from(column.wrapping_sub(chain.first))..).unwrap_or(&[])
-}
-
-/// Fills `slots` with what lies halfway between `from` and `to`; `before` and `after` are what comes before and after, where there is such.
-fn middles(slots: &mut [Pair], from: &[Pair], to: &[Pair], before: Option<&[Pair]>, after: Option<&[Pair]>) {
-    let inner = slots.iter_mut().zip(from.iter().zip(to));
-    match (before, after) {
-        (Some(before), Some(after)) => {
-            for ((slot, (from, to)), (before, after)) in inner.zip(before.iter().zip(after)) {
-                slot[0] = Layer::middle(Some(before[0]), from[0], to[0], Some(after[0]));
-            }
-        }
-        (Some(before), None) => {
-            for ((slot, (from, to)), before) in inner.zip(before) {
-                slot[0] = Layer::middle(Some(before[0]), from[0], to[0], None);
-            }
-        }
-        (None, Some(after)) => {
-            for ((slot, (from, to)), after) in inner.zip(after) {
-                slot[0] = Layer::middle(None, from[0], to[0], Some(after[0]));
-            }
-        }
-        (None, None) => {
-            for (slot, (from, to)) in inner {
-                slot[0] = Layer::middle(None, from[0], to[0], None);
-            }
-        }
+    fn of(&mut self, chain: &Chain) -> &mut [Node] {
+        let slots = self.node.get_mut(usize::from(chain.at)..).unwrap_or(&mut []);
+        slots.get_mut(..usize::from(chain.nodes())).unwrap_or(&mut [])
     }
 }
 

@@ -1,18 +1,17 @@
-//! The sheets of a row of cells at one moment: where each one's corners and middles are.
+//! The sheets of a row of cells at one moment: where each one's corners are, and how it bends between them.
 //! Rows of nodes come from `row`, sheet lists from the caller's memory; spans go to `span`.
 
-use crate::fixed::PlayUv;
 use crate::grid::Grid;
 use crate::lists::Lists;
-use crate::row::{Layer, NodeRow};
+use crate::row::NodeRow;
 
 /// One sheet of a cell, in caller's memory: its label, its test, and where its layer at the cell's left edge stands in the rows
-/// above, halfway down and below; that at the right edge is the next. Halfway there is only where space is cubic.
+/// above and below; that at the right edge is the next.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Sheet {
-    /// Above, halfway down, below.
-    nodes: [u16; 3],
+    /// Above, below.
+    nodes: [u16; 2],
     label: u8,
     test: u8,
 }
@@ -24,9 +23,9 @@ impl Sheet {
         self.label
     }
 
-    /// Its layers at the cell's left edge: above, halfway down, below.
+    /// Its layers at the cell's left edge: above, below.
     #[must_use]
-    pub const fn nodes(&self) -> [u16; 3] {
+    pub const fn nodes(&self) -> [u16; 2] {
         self.nodes
     }
 
@@ -78,27 +77,25 @@ pub struct Found {
     /// and the one after the last.
     end: u16,
     /// In the first: see [`Sheet`].
-    nodes: [u16; 3],
+    nodes: [u16; 2],
 }
 
-/// The rows of nodes that bound a row of cells: above, halfway down, below. Where space is linear, the middle one is not looked at.
-pub type Rows<'r, 'm> = [&'r NodeRow<'m>; 3];
+/// The rows of nodes that bound a row of cells: above, below.
+pub type Rows<'r, 'm> = [&'r NodeRow<'m>; 2];
 
 /// Where the layers of `label` stand in the cell in `column`, and in all those after it that have the same chains.
 #[inline(never)]
-fn look_up([top, halfway, bottom]: Rows<'_, '_>, cubic: bool, label: u8, column: usize) -> Option<Found> {
+fn look_up([top, bottom]: Rows<'_, '_>, label: u8, column: usize) -> Option<Found> {
     let ([above, high], [below, low]) = (top.find(label, column)?, bottom.find(label, column)?);
-    // Halfway down there is a layer wherever there is one above and below.
-    let [between, _] = if cubic { halfway.find(label, column)? } else { [0; 2] };
     let column = column as u16;
-    Some(Found { column, end: column.wrapping_add(high.min(low)), nodes: [above, between, below] })
+    Some(Found { column, end: column.wrapping_add(high.min(low)), nodes: [above, below] })
 }
 
 impl RowSheets<'_> {
     /// Looks up the corners of every sheet that `lists` names in `row`. A sheet without a layer at a corner is left out:
     /// only broken bundles have such.
     #[inline(never)]
-    pub fn fill(&mut self, grid: Grid, row: usize, lists: &Lists<'_>, rows: Rows<'_, '_>, cubic: bool) {
+    pub fn fill(&mut self, grid: Grid, row: usize, lists: &Lists<'_>, rows: Rows<'_, '_>) {
         let mut cursor = lists.row(row);
         let mut count = 0usize;
         let mut column = 0usize;
@@ -115,7 +112,7 @@ impl RowSheets<'_> {
                 // Columns ascend: what was found for one to the left holds up to where one of its chains ends.
                 let Some((known, slot)) = self.found.get_mut(usize::from(label)).zip(self.sheet.get_mut(count)) else { continue };
                 if column >= usize::from(known.end) {
-                    let Some(found) = look_up(rows, cubic, label, column) else { continue };
+                    let Some(found) = look_up(rows, label, column) else { continue };
                     *known = found;
                 }
                 let (along, most) = ((column as u16).wrapping_sub(known.column), known.end.wrapping_sub(column as u16));
@@ -144,70 +141,5 @@ impl RowSheets<'_> {
     pub fn of(&self, stretch: Stretch) -> &[Sheet] {
         let from = usize::from(stretch.sheet);
         self.sheet.get(from..from.wrapping_add(stretch.sheets.into())).unwrap_or(&[])
-    }
-}
-
-/// A block of a cell: all of it, or a quarter where space is cubic; with straight lines in between.
-#[derive(Clone, Copy, Debug)]
-pub struct Block<'p, 'm> {
-    /// The rows of nodes at the upper and the lower edge of the row of cells, and halfway down where space is cubic.
-    pub rows: Rows<'p, 'm>,
-    /// Cells are quartered: which quarter this is, rightwards and downwards.
-    pub quarter: Option<[bool; 2]>,
-}
-
-/// The positions at the corners of a block: above left and right, below left and right.
-pub type Corners = [PlayUv; 4];
-
-impl Block<'_, '_> {
-    /// Where `sheet` has the block's corners.
-    #[must_use]
-    #[inline(always)]
-    pub fn corners(&self, sheet: &Sheet) -> Corners {
-        let [top, halfway, bottom] = self.rows;
-        let [a, b, c] = sheet.nodes;
-        let Some([right, lower]) = self.quarter else {
-            let ([a, b], [c, d]) = (top.ends(a), bottom.ends(c));
-            return [a, b, c, d].map(|layer| layer.uv());
-        };
-        let (above, below) = if lower { ((halfway, b), (bottom, c)) } else { ((top, a), (halfway, b)) };
-        let edge = |(row, left): (&NodeRow<'_>, u16)| {
-            let &[from, middle, to] = row.thirds(left);
-            if right { [middle, to] } else { [from, middle] }
-        };
-        let ([a, b], [c, d]) = (edge(above), edge(below));
-        [a, b, c, d].map(|layer| layer.uv())
-    }
-
-    /// The ends, above and below, of the left edges of `sheet` in the block and in the one to the right of it, and of the right edge of that one; if
-    /// cells are not quartered, there is no other block: of the cell's edges.
-    #[must_use]
-    #[inline(always)]
-    pub fn verticals(&self, sheet: &Sheet) -> [[PlayUv; 2]; 3] {
-        let [top, halfway, bottom] = self.rows;
-        let [a, b, c] = sheet.nodes;
-        let between = |(above, below): (&Layer, &Layer)| [above.uv(), below.uv()];
-        let (above, below) = match self.quarter {
-            None => {
-                let ([a, b], [c, d]) = (top.ends(a), bottom.ends(c));
-                let right = between((b, d));
-                return [between((a, c)), right, right];
-            }
-            Some([_, false]) => (top.thirds(a), halfway.thirds(b)),
-            Some([_, true]) => (halfway.thirds(b), bottom.thirds(c)),
-        };
-        let ([a, b, c], [d, e, f]) = (above, below);
-        [(a, d), (b, e), (c, f)].map(between)
-    }
-
-    /// Field `which` of `sheet` at the cell's corners, Q16 pixels: straight from edge to edge of the cell, whatever space is.
-    #[must_use]
-    #[inline(always)]
-    pub fn field(&self, sheet: &Sheet, which: usize) -> [i32; 4] {
-        let [top, _, bottom] = self.rows;
-        let [a, _, c] = sheet.nodes;
-        let wide = |fields: [i16; 2]| i32::from(if which == 0 { fields[0] } else { fields[1] }).wrapping_shl(8);
-        let ([a, b], [c, d]) = (top.fields(a), bottom.fields(c));
-        [a, b, c, d].map(wide)
     }
 }

@@ -4,11 +4,13 @@
 use crate::Bundle;
 use crate::atlas::Texture;
 use crate::coverage::Chart;
-use crate::format::{LabelRecord, SPACE_CUBIC};
+use crate::format::LabelRecord;
 use crate::key::BACKDROP;
-use crate::row::Layer;
-use crate::sheet::{Block, RowSheets, Rows, Sheet};
-use crate::window::TILE_LOG2;
+use crate::patch::{Form, Patch};
+use crate::sheet::{RowSheets, Rows, Sheet};
+
+/// Blocks are at most 2^this pixels wide and high: over more of them rounding would add up to something.
+pub const BLOCK_LOG2: u32 = 3;
 
 /// What a plan is made of.
 #[derive(Clone, Copy, Debug)]
@@ -42,42 +44,49 @@ impl Site<'_, '_, '_> {
         self.charts.get(usize::from(sheet.label())).copied().unwrap_or_default()
     }
 
-    /// A block is 2^this pixels wide and high.
-    #[must_use]
-    pub fn log2(&self) -> u32 {
-        let cell = self.bundle.grid().log2;
-        if self.cubic() { cell.wrapping_sub(1) } else { cell }
-    }
-
-    /// A tile is 2^this pixels wide and high.
-    #[must_use]
-    pub fn tile_log2(&self) -> u32 {
-        self.log2().min(TILE_LOG2)
-    }
-
-    /// What is above and below strip `strip`, from the left corners of `sheet` on: nodes, and halfway to the next where space is cubic.
-    #[must_use]
-    pub fn lines(&self, strip: u32, sheet: &Sheet) -> [&[Layer]; 2] {
-        let ([top, halfway, bottom], [a, b, c]) = (self.rows, sheet.nodes());
-        let lines = match (self.cubic(), strip & 1) {
-            (false, _) => [(top, a), (bottom, c)],
-            (true, 0) => [(top, a), (halfway, b)],
-            (true, _) => [(halfway, b), (bottom, c)],
-        };
-        lines.map(|(row, from)| row.from(from))
-    }
-
-    /// Cells are quartered: space is cubic.
-    #[must_use]
-    pub fn cubic(&self) -> bool {
-        self.bundle.path().space == SPACE_CUBIC
-    }
-
-    /// Block `block` of strip `strip`: a quarter of a cell where space is cubic, else a cell.
+    /// A cell is 2^this pixels wide and high.
     #[must_use]
     #[inline(always)]
-    pub fn block(&self, block: u32, strip: u32) -> Block<'_, '_> {
-        let quarter = if self.cubic() { Some([block & 1 == 1, strip & 1 == 1]) } else { None };
-        Block { rows: self.rows, quarter }
+    pub fn log2(&self) -> u32 {
+        self.bundle.grid().log2
+    }
+
+    /// A block, a cell or a part of one, is 2^this pixels wide and high.
+    #[must_use]
+    #[inline(always)]
+    pub fn block_log2(&self) -> u32 {
+        self.log2().min(BLOCK_LOG2)
+    }
+
+    /// How far block `block` of strip `strip`, a row of blocks, is from its cell's left upper corner, pixels to the right and down.
+    #[must_use]
+    #[inline(always)]
+    pub fn offset(&self, block: u32, strip: u32) -> [u32; 2] {
+        let most = 1u32.wrapping_shl(self.log2()).wrapping_sub(1);
+        [block, strip].map(|blocks| blocks.wrapping_shl(self.block_log2()) & most)
+    }
+
+    /// What `sheet` has in the block that is so far from its cell's left upper corner.
+    #[must_use]
+    #[inline(always)]
+    pub fn block(&self, sheet: &Sheet, offset: [u32; 2]) -> Patch {
+        Patch::new(self.rows, sheet).part(offset, self.block_log2(), self.log2())
+    }
+
+    /// Where `sheet` is from pixel to pixel of that block: u and v, as its coverage is told from them.
+    #[must_use]
+    #[inline(always)]
+    pub fn forms(&self, sheet: &Sheet, offset: [u32; 2]) -> [Form; 2] {
+        Patch::new(self.rows, sheet).forms(self.log2()).map(|form| form.from(offset))
+    }
+
+    /// Its field `which`, Q16 pixels: straight from edge to edge of the cell, whatever space is.
+    #[must_use]
+    #[inline(always)]
+    pub fn field(&self, sheet: &Sheet, which: usize, offset: [u32; 2]) -> Form {
+        let ([top, bottom], [above, below]) = (self.rows, sheet.nodes());
+        let wide = |fields: [i16; 2]| i32::from(if which == 0 { fields[0] } else { fields[1] }).wrapping_shl(8);
+        let ([a, b], [c, d]) = (top.fields(above), bottom.fields(below));
+        Form::new([a, b, c, d].map(wide), [0; 2], self.log2()).from(offset)
     }
 }

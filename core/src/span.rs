@@ -2,10 +2,10 @@
 //! block by block where several sheets take turns. What is where comes from `plan`; pixels go to the caller's row.
 
 use crate::atlas::Texture;
-use crate::coverage::{Chart, Cover};
+use crate::coverage::{Bounds, Chart, Cover};
 use crate::fixed::PlayUv;
-use crate::sheet::Corners;
-use crate::window::{TILE_LOG2, Tile, fraction};
+use crate::patch::Form;
+use crate::window::{Line, Tile, fraction};
 
 /// A position in a window: v in its lower bits, [`fraction`] of them its fraction and ROWS above, then u, its upper WIDTH bits the texel.
 #[derive(Clone, Copy, Debug)]
@@ -53,38 +53,17 @@ pub fn run<T, const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(
     }
 }
 
-/// Like [`run`], with tiles of any 2^`log2` pixels.
-#[inline(always)]
-pub fn any_run<T, const WIDTH: u32, const ROWS: u32>(
-    tiles: &[Tile],
-    row: u32,
-    out: &mut [T],
-    log2: u32,
-    offsets: [u32; 2],
-    make: impl Fn(Packed<WIDTH, ROWS>) -> T,
-) {
-    let mut out = out;
-    for tile in tiles {
-        let Some((pixels, rest)) = out.split_at_mut_checked(1 << log2.min(TILE_LOG2)) else { return };
-        out = rest;
-        alternate(pixels, tile.row(row), offsets, &make);
-    }
-}
-
-/// Paints `pixels` from `at` on, `step` further each, moved by one of the offsets in turn.
+/// Paints `pixels` along a line, moved by one of the offsets in turn.
 #[inline(always)]
 fn alternate<T, const WIDTH: u32, const ROWS: u32>(
     pixels: &mut [T],
-    [at, step]: [u32; 2],
+    [mut at, mut step, bend]: Line,
     [even, odd]: [u32; 2],
     make: impl Fn(Packed<WIDTH, ROWS>) -> T,
 ) {
-    let turn = odd.wrapping_sub(even);
-    let (there, back) = (step.wrapping_add(turn), step.wrapping_sub(turn));
-    let mut at = at.wrapping_add(even);
     for (x, pixel) in pixels.iter_mut().enumerate() {
-        *pixel = make(Packed(at));
-        at = at.wrapping_add(if x & 1 == 0 { there } else { back });
+        *pixel = make(Packed(at.wrapping_add(if x & 1 == 0 { even } else { odd })));
+        (at, step) = (at.wrapping_add(step), step.wrapping_add(bend));
     }
 }
 
@@ -98,205 +77,114 @@ pub fn part<T, const WIDTH: u32, const ROWS: u32>(
     [even, odd]: [u32; 2],
     make: impl Fn(Packed<WIDTH, ROWS>) -> T,
 ) {
-    let [mut at, step] = tile.row(row);
+    let [mut at, mut step, bend] = tile.row(row);
     for (x, pixel) in pixels.iter_mut().enumerate() {
         if shown & 1 != 0 {
             *pixel = make(Packed(at.wrapping_add(if x & 1 == 0 { even } else { odd })));
         }
-        (shown, at) = (shown >> 1, at.wrapping_add(step));
+        (shown, at, step) = (shown >> 1, at.wrapping_add(step), step.wrapping_add(bend));
     }
 }
 
-/// A sheet along a row of a block: the position at its first pixel, and the step to the next.
+/// A sheet along a row of a block: the position at its first pixel, the step to the next, and how steps change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Span {
     /// At the first pixel.
     pub from: PlayUv,
-    /// From pixel to pixel.
+    /// From there to the next.
     pub step: PlayUv,
-}
-
-/// The value `step` / 2^`log2` of the way from `from` to `to`, rounded down.
-#[inline(always)]
-const fn down(from: i32, to: i32, step: u32, log2: u32) -> i32 {
-    let far = to.wrapping_sub(from);
-    let rows = step as i32;
-    // Positions differ by less than 2^28.6.
-    if log2 <= 2 {
-        return from.wrapping_add(far.wrapping_mul(rows) >> log2);
-    }
-    // In two parts, because the product does not fit.
-    let rest = far & 1i32.wrapping_shl(log2).wrapping_sub(1);
-    from.wrapping_add((far >> log2).wrapping_mul(rows)).wrapping_add(rest.wrapping_mul(rows) >> log2)
-}
-
-/// One of a position's coordinates along row `row` of a block of 2^`log2` pixels, given those at its corners: at the first pixel, and from pixel to pixel.
-#[inline(always)]
-const fn along([a, b, c, d]: [i32; 4], row: u32, log2: u32) -> (i32, i32) {
-    let (from, to) = (down(a, c, row, log2), down(b, d, row, log2));
-    (from, to.wrapping_sub(from).wrapping_add((1i32 << log2) >> 1) >> log2)
+    /// From step to step.
+    pub bend: PlayUv,
 }
 
 impl Span {
-    /// The span of row `row` of a block of 2^`log2` pixels, whose corners are given; steps rounded to nearest, so that the last pixel is at
-    /// most 2^(log2 - 1) / 65536 texel off.
+    /// The first row of `forms`, of u and v.
     #[must_use]
-    #[inline]
-    pub const fn new([a, b, c, d]: Corners, row: u32, log2: u32) -> Self {
-        let (u, step_u) = along([a.u, b.u, c.u, d.u], row, log2);
-        let (v, step_v) = along([a.v, b.v, c.v, d.v], row, log2);
-        Self { from: PlayUv { u, v }, step: PlayUv { u: step_u, v: step_v } }
+    #[inline(always)]
+    pub const fn new(&[u, v]: &[Form; 2]) -> Self {
+        Self { from: PlayUv { u: u.at, v: v.at }, step: PlayUv { u: u.step, v: v.step }, bend: PlayUv { u: u.bend, v: v.bend } }
     }
 
-    /// Like [`Span::new`], `across` and `down` quarters of a pixel beside the pixels' centres.
-    #[must_use]
-    pub const fn beside(corners: Corners, row: u32, log2: u32, [across, down]: [i32; 2]) -> Self {
-        // In quarters of pixels there are four times as many.
-        let Self { from, step } = Self::new(corners, row.wrapping_mul(4).wrapping_add_signed(down), log2.wrapping_add(2));
-        Self {
-            from: PlayUv { u: from.u.wrapping_add(step.u.wrapping_mul(across)), v: from.v.wrapping_add(step.v.wrapping_mul(across)) },
-            step: PlayUv { u: step.u.wrapping_mul(4), v: step.v.wrapping_mul(4) },
-        }
+    /// One pixel on.
+    #[inline(always)]
+    const fn next(&mut self) {
+        (self.from, self.step) = (self.from.plus(self.step), self.step.plus(self.bend));
     }
 
-    /// The position `pixels` pixels on.
+    /// What lies around its first `pixels` pixels.
     #[must_use]
-    pub const fn at(&self, pixels: usize) -> PlayUv {
-        let count = pixels as i32;
-        PlayUv {
-            u: self.from.u.wrapping_add(self.step.u.wrapping_mul(count)),
-            v: self.from.v.wrapping_add(self.step.v.wrapping_mul(count)),
-        }
+    #[inline(always)]
+    pub fn bounds(&self, pixels: u32) -> Bounds {
+        let steps = pixels.wrapping_sub(1);
+        let (steps, curves) = (steps as i32, (steps.wrapping_mul(steps.wrapping_sub(1)) >> 1) as i32);
+        let on = |from: i32, step: i32, bend: i32| from.wrapping_add(step.wrapping_mul(steps)).wrapping_add(bend.wrapping_mul(curves));
+        let Self { from, step, bend } = *self;
+        let last = PlayUv { u: on(from.u, step.u, bend.u), v: on(from.v, step.v, bend.v) };
+        // An eighth of what steps change, times their number, is how far a curve bulges.
+        let bulge = |bend: i32| (bend.unsigned_abs().wrapping_mul(steps.wrapping_mul(steps) as u32) >> 3) as i32;
+        Bounds::of(from, last).wider(PlayUv { u: bulge(bend.u), v: bulge(bend.v) })
     }
 }
 
 /// Paints the pixels of `out` that `shown` names, a bit each; `make` turns a position into a pixel, given its place in `out`. Positions outside the
 /// picture count as its edge.
 #[inline(always)]
-pub fn paint<T>(out: &mut [T], mut shown: u32, span: Span, texture: &Texture<'_>, make: impl Fn(PlayUv, usize) -> T) {
-    let mut uv = span.from;
-    // A span is straight: if both its ends are inside, all of it is.
-    let inside = texture.holds(uv) && texture.holds(span.at(out.len().wrapping_sub(1)));
+pub fn paint<T>(out: &mut [T], mut shown: u32, mut span: Span, texture: &Texture<'_>, make: impl Fn(PlayUv, usize) -> T) {
+    let Bounds { low, high } = span.bounds(out.len() as u32);
+    let inside = texture.holds(low) && texture.holds(high);
     for (x, pixel) in out.iter_mut().enumerate() {
         if shown & 1 != 0 {
-            *pixel = make(if inside { uv } else { texture.clamp(uv) }, x);
+            *pixel = make(if inside { span.from } else { texture.clamp(span.from) }, x);
         }
         shown >>= 1;
-        uv = uv.plus(span.step);
+        span.next();
     }
-}
-
-/// A field along a row of a block, Q16 pixels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Field {
-    from: i32,
-    step: i32,
-}
-
-impl Field {
-    /// The field of row `row` of a cell of 2^`log2` pixels from pixel `first` on, given what it is at the cell's corners, Q16 pixels.
-    #[must_use]
-    #[inline(always)]
-    pub fn new([a, b, c, d]: [i32; 4], row: u32, log2: u32, first: u32) -> Self {
-        let half = (1i32 << log2) >> 1;
-        // Fields differ by less than 2^24; there are at most 2^5 rows, or quarters of 2^7: the product fits.
-        let down = |from: i32, to: i32| from.wrapping_add(to.wrapping_sub(from).wrapping_mul(row as i32) >> log2);
-        let (from, to) = (down(a, c), down(b, d));
-        let step = to.wrapping_sub(from).wrapping_add(half) >> log2;
-        Self { from: from.wrapping_add(step.wrapping_mul(first as i32)), step }
-    }
-
-    /// Like [`Field::new`], `across` and `down` quarters of a pixel beside the pixels' centres.
-    #[must_use]
-    pub fn beside(corners: [i32; 4], row: u32, log2: u32, first: u32, [across, down]: [i32; 2]) -> Self {
-        let first = first.wrapping_mul(4).wrapping_add_signed(across);
-        let Self { from, step } = Self::new(corners, row.wrapping_mul(4).wrapping_add_signed(down), log2.wrapping_add(2), first);
-        Self { from, step: step.wrapping_mul(4) }
-    }
-
-    /// At which of the next `pixels` pixels the field is positive: a bit each.
-    #[must_use]
-    #[inline(always)]
-    pub fn positive(&self, pixels: usize) -> u32 {
-        // What is below zero where the field is above.
-        negative(self.from.wrapping_neg(), self.step.wrapping_neg(), pixels)
-    }
-}
-
-/// Which of the next `pixels` pixels have a value below zero, from `value` on, `step` more each: a bit each.
-#[inline(always)]
-fn negative(mut value: i32, step: i32, pixels: usize) -> u32 {
-    // A line: where both ends are of one sign, all of it is. Of four pixels, telling takes as long as they do.
-    let last = value.wrapping_add(step.wrapping_mul(pixels.wrapping_sub(1) as i32));
-    if pixels > 4 && value ^ last >= 0 {
-        return if value < 0 { u32::MAX.wrapping_shr(32u32.wrapping_sub(pixels as u32)) } else { 0 };
-    }
-    let mut below = 0u32;
-    for first in (0..pixels as u32).step_by(4) {
-        let mut four = 0u32;
-        for pixel in 0..4 {
-            four |= (value as u32 >> 31).wrapping_shl(pixel);
-            value = value.wrapping_add(step);
-        }
-        below |= four.wrapping_shl(first);
-    }
-    below
-}
-
-/// Which pixels of row `row` of a block of 2^`log2`, four at least, lie on the near side of an edge that its corners are so far `beyond`: a bit each, at
-/// positions as [`Span::new`] has them.
-#[inline(always)]
-#[must_use]
-pub fn near(beyond: [i32; 4], row: u32, log2: u32) -> u32 {
-    let (from, step) = along(beyond, row, log2);
-    negative(from, step, 1 << log2)
 }
 
 /// Those of the pixels that `shown` names whose texels the mask has.
 #[inline(always)]
 #[must_use]
-pub fn covered(shown: u32, span: Span, texture: &Texture<'_>) -> u32 {
-    let (mut uv, mut rest, mut bit, mut covered) = (span.from, shown, 1u32, 0u32);
+pub fn covered(shown: u32, mut span: Span, texture: &Texture<'_>) -> u32 {
+    let (mut rest, mut bit, mut covered) = (shown, 1u32, 0u32);
     while rest != 0 {
-        if rest & 1 != 0 && texture.covered(uv) {
+        if rest & 1 != 0 && texture.covered(span.from) {
             covered |= bit;
         }
-        (rest, bit, uv) = (rest >> 1, bit.wrapping_shl(1), uv.plus(span.step));
+        (rest, bit) = (rest >> 1, bit.wrapping_shl(1));
+        span.next();
     }
     covered
 }
 
-/// Those of the pixels that `shown` names, of a span of `pixels`, at which the span lies inside `chart`.
+/// Those of the pixels that `shown` names, of the first row of `forms`, `pixels` wide, at which it lies inside `chart`.
 #[inline(always)]
 #[must_use]
-pub fn inside(chart: &Chart, shown: u32, pixels: usize, span: Span, texture: &Texture<'_>) -> u32 {
-    match chart.cover([[span.from, span.at(pixels.wrapping_sub(1))]; 2], texture) {
+pub fn inside(chart: &Chart, mut shown: u32, pixels: u32, forms: &[Form; 2], texture: &Texture<'_>) -> u32 {
+    let span = Span::new(forms);
+    let bounds = span.bounds(pixels);
+    match chart.cover(&bounds, texture) {
         Cover::Nothing => return 0,
         Cover::All => return shown,
         Cover::Part => {}
     }
-    let Span { from: PlayUv { u, v }, step } = span;
-    let across = before(u, chart.right, step.u, pixels) & !before(u, chart.left, step.u, pixels);
-    let shown = shown & across & before(v, chart.bottom, step.v, pixels) & !before(v, chart.top, step.v, pixels);
+    chart.crossed(forms, &bounds, |edge| {
+        let near = edge.beyond.negative(pixels);
+        shown &= if edge.upper { near } else { !near };
+    });
     if chart.masked() { covered(shown, span, texture) } else { shown }
-}
-
-/// Which of the next `pixels` pixels have a value below `edge`, from `value` on, `step` more each: a bit each.
-#[inline(never)]
-fn before(value: i32, edge: i32, step: i32, pixels: usize) -> u32 {
-    negative(value.wrapping_sub(edge), step, pixels)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::{Span, inside, near};
+    use super::inside;
     use crate::atlas::Texture;
-    use crate::coverage::{Bounds, Chart};
+    use crate::coverage::Chart;
     use crate::fixed::PlayUv;
     use crate::format::LabelRecord;
+    use crate::patch::Patch;
 
     #[test]
-    fn edges_that_a_block_may_cross_tell_what_a_test_of_each_position_does() {
+    fn pixels_inside_a_chart_are_those_whose_positions_are() {
         let mut seed = 9u32;
         let mut next = |below: u32| {
             seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -307,19 +195,20 @@ mod tests {
         let (mut some, mut none) = (0, 0);
         for round in 0..20_000u32 {
             let reach = if round % 2 == 0 { 1 << 17 } else { 1 << 20 };
-            let corners = [(); 4].map(|()| PlayUv { u: (20 << 16) + next(reach) - next(reach), v: (31 << 16) + next(reach) - next(reach) });
+            let mut around = |u: i32, v: i32| PlayUv { u: (u << 16) + next(reach) - next(reach), v: (v << 16) + next(reach) - next(reach) };
+            let patch = Patch { corners: [(); 4].map(|()| around(20, 31)), across: around(0, 0), down: around(0, 0) };
             for log2 in [2, 3] {
-                let pixels = 1usize << log2;
-                for row in 0..pixels as u32 {
-                    let all = u32::MAX >> (32 - pixels);
-                    let mut told = all;
-                    chart.crossed(&corners, &Bounds::around(&corners), |edge| {
-                        let near = near(edge.beyond, row, log2);
-                        told &= if edge.upper { near } else { !near };
+                let pixels = 1u32 << log2;
+                let mut forms = patch.forms(log2);
+                for row in 0..pixels {
+                    let told = inside(&chart, u32::MAX >> (32 - pixels), pixels, &forms, &texture);
+                    let exact = (0..pixels).fold(0, |bits, x| {
+                        let [u, v] = patch.forms(log2).map(|form| form.at([x, row]));
+                        bits | u32::from(chart.covers(PlayUv { u, v }, &texture)) << x
                     });
-                    let exact = inside(&chart, all, pixels, Span::new(corners, row, log2), &texture);
-                    assert_eq!(told, exact, "{corners:?}, row {row}");
+                    assert_eq!(told, exact, "{patch:?}, row {row}");
                     (some, none) = (some + u32::from(exact != 0), none + u32::from(exact == 0));
+                    forms.iter_mut().for_each(crate::patch::Form::next_row);
                 }
             }
         }

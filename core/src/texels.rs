@@ -261,11 +261,10 @@ fn paint_run<F: Filter, const WIDTH: u32, const ROWS: u32>(
 ) {
     let offsets = filter.offsets(WIDTH);
     let make = |at: Packed<WIDTH, ROWS>| filter.packed(at, &colour);
-    // Tiles of four or eight in a picture 512 wide are the rule, and have loops of their own.
-    match (WIDTH, log2) {
-        (9, 2) => span::run::<_, WIDTH, ROWS, 4>(tiles, row, out, offsets, make),
-        (9, 3) => span::run::<_, WIDTH, ROWS, 8>(tiles, row, out, offsets, make),
-        _ => span::any_run(tiles, row, out, log2, offsets, make),
+    // Cells of four pixels are rare.
+    match log2 {
+        3 => span::run::<_, WIDTH, ROWS, 8>(tiles, row, out, offsets, make),
+        _ => span::run::<_, WIDTH, ROWS, 4>(tiles, row, out, offsets, make),
     }
 }
 

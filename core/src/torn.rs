@@ -1,12 +1,14 @@
 //! Torn cells: which of a cell's sheets each of its blocks can show, and which pixels of a block show which, worked out once for all rows of a strip.
 //! Sheets come from `site`, tests from `coverage` and `span`; `plan` asks, `draw` paints what comes out.
 
+use crate::atlas::Texture;
 use crate::coverage::{Bounds, Cover, Edge};
 use crate::format::MAX_SHEETS;
 use crate::lists::{CHART, FIELD};
-use crate::sheet::{Corners, Sheet};
+use crate::patch::Form;
+use crate::sheet::Sheet;
 use crate::site::Site;
-use crate::span::{self, Field, Span};
+use crate::span::{self, Span};
 use crate::window::{Room, Tile};
 
 /// A block that shows several sheets, or whose positions fit no window, in caller's memory.
@@ -85,64 +87,57 @@ impl Shown {
         Self([a & !c, b & !d])
     }
 
-    /// What lies around all positions at these pixels of a block of 2^`log2` with such `corners`.
+    /// What lies around all positions of `forms` at these pixels.
     #[inline(never)]
-    fn bounds(self, corners: Corners, log2: u32) -> Bounds {
+    fn bounds(self, mut forms: [Form; 2], log2: u32) -> Bounds {
         let mut bounds = Bounds::NOTHING;
         for row in 0..1u32.wrapping_shl(log2) {
             let shown = self.row(row);
-            let Some(last) = shown.checked_ilog2() else { continue };
-            let span = Span::new(corners, row, log2);
-            // A span is straight.
-            bounds = bounds.join(Bounds::of(span.at(shown.trailing_zeros() as usize), span.at(last as usize)));
+            if let Some(last) = shown.checked_ilog2() {
+                let first = shown.trailing_zeros();
+                let [u, v] = &forms;
+                let from = [u.from([first, 0]), v.from([first, 0])];
+                bounds = bounds.join(Span::new(&from).bounds(last.wrapping_sub(first).wrapping_add(1)));
+            }
+            forms.iter_mut().for_each(Form::next_row);
         }
         bounds
     }
 }
 
-/// Blocks of 2^2 or 2^this pixels have sides.
-pub const SIDES_LOG2: u32 = 3;
-
 impl Mixed {
     /// Works out the block's sides in strip `strip`, for positions that `room` has; how many of the `slots` they take.
-    /// `None` where positions fit no window, there is no room, or blocks of such a size have no sides. The frontmost sheet that covers a pixel shows.
+    /// `None` where positions fit no window, or there is no room. The frontmost sheet that covers a pixel shows.
     #[inline(never)]
     pub fn share(&self, site: &Site<'_, '_, '_>, strip: u32, room: &Room, slots: &mut [Side]) -> Option<usize> {
-        let log2 = site.log2();
-        if log2 != 2 && log2 != SIDES_LOG2 {
-            return None;
-        }
-        let block = site.block(self.block.into(), strip);
+        let log2 = site.block_log2();
+        let offset = site.offset(self.block.into(), strip);
         let mut left = Shown::all(log2);
         let (mut sheets, mut sides) = (self.sheets, 0usize);
         while sheets != 0 && left != Shown::NONE {
             let place = usize::from(self.sheet).wrapping_add(sheets.trailing_zeros() as usize);
             sheets &= sheets.wrapping_sub(1);
             let sheet = &site.sheets.sheet.get(place)?.further(self.along);
-            let corners = block.corners(sheet);
-            let bounds = Bounds::around(&corners);
+            let patch = site.block(sheet, offset);
+            let bounds = patch.bounds();
             let mut shown = left;
             // The last one covers what is left.
             if sheets != 0 {
                 let chart = site.chart(sheet);
                 if sheet.test() != CHART {
                     for which in 0..if chart.strip() { 2 } else { 1 } {
-                        let (place, corners) = ((strip, self.block.into()), block.field(sheet, which));
-                        let rows = if log2 == 2 { field_rows::<2> } else { field_rows::<3> };
-                        shown = shown.and(rows(site, place, corners));
+                        // What is below zero where the field is above.
+                        shown = shown.and(negative(site.field(sheet, which, offset).negated(), log2));
                     }
                 }
-                if sheet.test() != FIELD {
-                    chart.crossed(&corners, &bounds, |Edge { beyond: [a, b, c, d], upper }| {
-                        let near = if log2 == 2 { near_rows::<2>(a, b, c, d) } else { near_rows::<3>(a, b, c, d) };
-                        let near = Shown(near.into());
+                if sheet.test() != FIELD && shown != Shown::NONE {
+                    let forms = site.forms(sheet, offset);
+                    chart.crossed(&forms, &bounds, |Edge { beyond, upper }| {
+                        let near = negative(beyond, log2);
                         shown = if upper { shown.and(near) } else { shown.and_not(near) };
                     });
                     if chart.masked() && shown != Shown::NONE {
-                        shown = Shown::rows(log2, |row| match shown.row(row) {
-                            0 => 0,
-                            shown => span::covered(shown, Span::new(corners, row, log2), &site.texture),
-                        });
+                        shown = masked(shown, forms, log2, &site.texture);
                     }
                 }
                 if shown == Shown::NONE {
@@ -151,120 +146,78 @@ impl Mixed {
             }
             left = left.and_not(shown);
             // What does not show may lie anywhere.
-            let row = room.row(&bounds).or_else(|| room.row(&shown.bounds(corners, log2)))?;
+            let row = room.row(&bounds).or_else(|| room.row(&shown.bounds(site.forms(sheet, offset), log2)))?;
             *slots.get_mut(sides)? =
-                Side { tile: room.window.tile(corners, row, log2), shown, block: self.block, row, label: sheet.label().into() };
+                Side { tile: room.window.tile(&patch, row, log2), shown, block: self.block, row, label: sheet.label().into() };
             sides = sides.wrapping_add(1);
         }
         Some(sides)
     }
 }
 
-/// Which pixels of a block lie on the near side of an edge that its corners are so far beyond, as [`Shown`] has them.
-// Numbers alone go in and out in registers.
+/// At which pixels of a block `form` is below zero.
+// Called from several places, and long.
 #[inline(never)]
-fn near_rows<const LOG2: u32>(a: i32, b: i32, c: i32, d: i32) -> (u32, u32) {
-    let Shown([upper, lower]) = Shown::rows(LOG2, |row| span::near([a, b, c, d], row, LOG2));
-    (upper, lower)
+fn negative(mut form: Form, log2: u32) -> Shown {
+    Shown::rows(log2, |_| {
+        let row = form.negative(1u32.wrapping_shl(log2));
+        form.next_row();
+        row
+    })
 }
 
-/// At which pixels of block `block` of strip `strip` a field is positive, given what it is at the cell's corners.
-#[inline(never)]
-fn field_rows<const LOG2: u32>(site: &Site<'_, '_, '_>, (strip, block): (u32, u32), corners: [i32; 4]) -> Shown {
-    let cell = site.bundle.grid().log2;
-    // Pixels of the cell above the block, and to the left of it.
-    let [above, left] = [strip, block].map(|blocks| blocks.wrapping_shl(LOG2) & 1u32.wrapping_shl(cell).wrapping_sub(1));
-    Shown::rows(LOG2, |row| Field::new(corners, above.wrapping_add(row), cell, left).positive(1 << LOG2))
+/// Those of the pixels that `shown` names whose texels the mask has.
+#[inline(always)]
+fn masked(shown: Shown, mut forms: [Form; 2], log2: u32, texture: &Texture<'_>) -> Shown {
+    Shown::rows(log2, |row| {
+        let shown = shown.row(row);
+        let covered = if shown == 0 { 0 } else { span::covered(shown, Span::new(&forms), texture) };
+        forms.iter_mut().for_each(Form::next_row);
+        covered
+    })
 }
 
-/// Which of a torn cell's `sheets` each of its blocks in strip `strip` can show, a bit each: those that cover part of it, in front of the
-/// first that covers all of it. Where a cell is one block, the second is none.
+/// Which of a torn cell's `sheets` its block that is so far from its left upper corner can show, a bit each: those that cover part of it, in front of
+/// the first that covers all of it.
 #[must_use]
 #[inline(never)]
-pub fn candidates(site: &Site<'_, '_, '_>, strip: u32, sheets: &[Sheet]) -> [u16; 2] {
-    let (cubic, lower) = (site.cubic(), strip & 1 == 1);
-    let block = site.block(0, strip);
-    let (mut left, mut right) = (Seen { sheets: 0, open: true }, Seen { sheets: 0, open: cubic });
+pub fn candidates(site: &Site<'_, '_, '_>, offset: [u32; 2], sheets: &[Sheet]) -> u16 {
+    let mut shown = 0u16;
     let mut bit = 1u16;
-    let Some((_, before)) = sheets.split_last() else { return [0; 2] };
+    let Some((_, before)) = sheets.split_last() else { return 0 };
     for sheet in before.iter().take(MAX_SHEETS - 1) {
         let Some(chart) = site.charts.get(usize::from(sheet.label())) else { break };
-        let (mut on_left, mut on_right) = (Cover::All, Cover::All);
+        let mut cover = Cover::All;
         if sheet.test() != CHART {
-            [on_left, on_right] = field_covers(block.field(sheet, 0), cubic, lower);
-            if chart.strip() {
-                let [left, right] = field_covers(block.field(sheet, 1), cubic, lower);
-                (on_left, on_right) = (on_left.and(left), on_right.and(right));
+            for which in 0..if chart.strip() { 2 } else { 1 } {
+                cover = cover.and(field_cover(&site.field(sheet, which, offset), site.block_log2()));
             }
         }
-        let (asked, asked_right) = (left.open && on_left != Cover::Nothing, right.open && on_right != Cover::Nothing);
-        if sheet.test() != FIELD && (asked || asked_right) {
-            let [a, b, c] = block.verticals(sheet);
-            if asked {
-                on_left = on_left.and(chart.cover([a, b], &site.texture));
-            }
-            if asked_right {
-                on_right = on_right.and(chart.cover([b, c], &site.texture));
-            }
+        if sheet.test() != FIELD && cover != Cover::Nothing {
+            cover = cover.and(chart.cover(&site.block(sheet, offset).bounds(), &site.texture));
         }
-        left.see(bit, on_left);
-        right.see(bit, on_right);
-        if !left.open && !right.open {
-            break;
+        if cover != Cover::Nothing {
+            shown |= bit;
+        }
+        if cover == Cover::All {
+            return shown;
         }
         bit = bit.wrapping_shl(1);
     }
     // The last one covers what is left.
-    left.see(bit, Cover::All);
-    right.see(bit, Cover::All);
-    [left.sheets, right.sheets]
+    shown | bit
 }
 
-/// What is seen of a block, from front to back.
-struct Seen {
-    /// The sheets, a bit each.
-    sheets: u16,
-    /// Those behind them may show.
-    open: bool,
-}
-
-impl Seen {
-    /// The sheet of `bit` covers so much of it.
-    #[inline(always)]
-    fn see(&mut self, bit: u16, cover: Cover) {
-        if self.open && cover != Cover::Nothing {
-            self.sheets |= bit;
-            self.open = cover != Cover::All;
-        }
-    }
-}
-
-/// How much of a cell's blocks in one of its strips a field of `corners` at the cell's corners covers: of the left one and the right one where
-/// they are `quarters`, of the cell where not.
+/// How much of a block of 2^`log2` pixels a field covers.
 #[inline(always)]
-fn field_covers([mut a, mut b, mut c, mut d]: [i32; 4], quarters: bool, lower: bool) -> [Cover; 2] {
-    if !quarters {
-        return [field_cover([a, b, c, d]); 2];
-    }
-    let middle = |x: i32, y: i32| x.wrapping_add(y) >> 1;
-    let (left, right) = (middle(a, c), middle(b, d));
-    if lower {
-        (a, b) = (left, right);
-    } else {
-        (c, d) = (left, right);
-    }
-    let (above, below) = (middle(a, b), middle(c, d));
-    [field_cover([a, above, c, below]), field_cover([above, b, below, d])]
-}
-
-/// How much of a block a field of these values at its corners covers.
-#[inline(always)]
-fn field_cover([a, b, c, d]: [i32; 4]) -> Cover {
+fn field_cover(field: &Form, log2: u32) -> Cover {
     // Rounding moves a field by less than this, Q16 pixels.
     const SLACK: i32 = 64;
-    if a > SLACK && b > SLACK && c > SLACK && d > SLACK {
+    let side = 1u32.wrapping_shl(log2);
+    let corners = [[0, 0], [side, 0], [0, side], [side, side]].map(|corner| field.at(corner));
+    if corners.iter().all(|&corner| corner > SLACK) {
         Cover::All
-    } else if a < -SLACK && b < -SLACK && c < -SLACK && d < -SLACK {
+    } else if corners.iter().all(|&corner| corner < -SLACK) {
         Cover::Nothing
     } else {
         Cover::Part

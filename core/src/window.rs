@@ -1,34 +1,71 @@
 //! Windows: so many rows of the source image that a position in them is one 32-bit number. What is drawn is stepped in tiles of such positions,
-//! which come from a block's corners; `plan` and `torn` make them, `span` draws them.
+//! which come from a block's patch; `plan` and `torn` make them, `span` draws them.
 
 use crate::coverage::Bounds;
-use crate::sheet::Corners;
+use crate::patch::{Patch, rounded};
 
-/// A tile, in caller's memory: 2^[`TILE_LOG2`] pixels of a row, or a block's where that is smaller, and as many rows. All are positions in a
-/// window, or differences of such, as `span::Packed` holds them.
+/// A tile, in caller's memory: a patch of a block, as [`crate::patch::Form`] has one, of positions in a window, or differences of such, as
+/// `span::Packed` holds them.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Tile {
     /// Where its first pixel is in its first row.
     pub at: u32,
-    /// How far it is from pixel to pixel there.
-    pub step: u32,
-    /// How far it is from row to row,
+    /// How far it is from there to the next row,
     pub down: u32,
-    /// and how the step changes.
+    /// and how that changes from row to row.
+    pub fall: u32,
+    /// How far it is from pixel to pixel at first,
+    pub step: u32,
+    /// how that changes from row to row,
     pub turn: u32,
+    /// and from pixel to pixel.
+    pub bend: u32,
 }
+
+/// The pixels of a tile's row: where the first is, how far it is to the next, and how that changes.
+pub type Line = [u32; 3];
 
 impl Tile {
-    /// Where it is in row `row` of its own, and how far it is from pixel to pixel there.
+    /// The sum of two, of a lane each.
+    #[must_use]
     #[inline(always)]
-    pub const fn row(&self, row: u32) -> [u32; 2] {
-        [self.at.wrapping_add(self.down.wrapping_mul(row)), self.step.wrapping_add(self.turn.wrapping_mul(row))]
+    pub const fn plus(&self, other: &Self) -> Self {
+        Self {
+            at: self.at.wrapping_add(other.at),
+            down: self.down.wrapping_add(other.down),
+            fall: self.fall.wrapping_add(other.fall),
+            step: self.step.wrapping_add(other.step),
+            turn: self.turn.wrapping_add(other.turn),
+            bend: self.bend.wrapping_add(other.bend),
+        }
+    }
+
+    /// One of 2^`log2` pixels of which all numbers are told around its middle, where half of the rows and columns are on either side: rounded there, they
+    /// add up to least.
+    #[must_use]
+    #[inline(always)]
+    pub const fn from_middle(self, log2: u32) -> Self {
+        let Self { at, down, fall, step, turn, bend } = self;
+        let half = 1u32.wrapping_shl(log2) >> 1;
+        let curves = bend.wrapping_add(fall).wrapping_mul(half.wrapping_mul(half.wrapping_add(1)) >> 1);
+        let steps = step.wrapping_add(down).wrapping_sub(half.wrapping_mul(turn)).wrapping_mul(half);
+        Self {
+            at: at.wrapping_add(curves).wrapping_sub(steps),
+            down: down.wrapping_sub(half.wrapping_mul(turn.wrapping_add(fall))),
+            step: step.wrapping_sub(half.wrapping_mul(turn.wrapping_add(bend))),
+            ..self
+        }
+    }
+
+    /// Row `row` of its own.
+    #[inline(always)]
+    pub const fn row(&self, row: u32) -> Line {
+        let falls = row.wrapping_mul(row.wrapping_sub(1)) >> 1;
+        let at = self.at.wrapping_add(self.down.wrapping_mul(row)).wrapping_add(self.fall.wrapping_mul(falls));
+        [at, self.step.wrapping_add(self.turn.wrapping_mul(row)), self.bend]
     }
 }
-
-/// Tiles are at most 2^this pixels wide and high: over more of them rounding would add up to something.
-pub const TILE_LOG2: u32 = 3;
 
 /// Fraction bits of v in windows 2^`width_log2` texels wide: where there can be as many, whole rows begin as many texels apart as the picture's do.
 #[must_use]
@@ -64,44 +101,91 @@ impl Window {
         if known && height >= 1 << rows_log2 { Some(Self { width_log2, rows_log2 }) } else { None }
     }
 
-    /// A difference of u and v in Q16 texels, or a position with v from the window's first row on, as `span::Packed` holds it,
-    /// divided by 2^`log2`, each to the nearest.
+    /// A difference of v (`DOWN`) or u in Q16 texels, or a position, v from the window's first row on, as `span::Packed` holds it, divided by 2^`log2`, to
+    /// the nearest.
     #[inline(always)]
-    pub const fn pack(self, u: i32, v: i32, log2: u32) -> u32 {
-        let bits = fraction(self.width_log2).wrapping_add(self.rows_log2);
+    pub const fn lane<const DOWN: bool>(self, x: i32, log2: u32) -> u32 {
+        let fraction = fraction(self.width_log2);
+        let bits = fraction.wrapping_add(self.rows_log2);
+        if DOWN {
+            return rounded(x, 16u32.wrapping_sub(fraction).wrapping_add(log2)) as u32;
+        }
         // u has what v and whole texels leave of 32 bits for its fraction.
-        let across = 16u32.wrapping_add(bits).wrapping_add(self.width_log2).wrapping_sub(32).wrapping_add(log2);
-        let down = 16u32.wrapping_sub(fraction(self.width_log2)).wrapping_add(log2);
-        (rounded(u, across) as u32).wrapping_shl(bits).wrapping_add(rounded(v, down) as u32)
+        (rounded(x, 16u32.wrapping_add(bits).wrapping_add(self.width_log2).wrapping_sub(32).wrapping_add(log2)) as u32).wrapping_shl(bits)
     }
 
-    /// The tile of 2^`log2` by 2^`log2` pixels between corners `a` and `b` above, `c` and `d` below, in a window from `row` on.
+    /// The tile of `patch`, 2^`log2` pixels wide and high, in a window from `row` on.
     #[must_use]
     #[inline(always)]
-    pub fn tile(self, corners: Corners, row: u16, log2: u32) -> Tile {
+    pub fn tile(self, patch: &Patch, row: u16, log2: u32) -> Tile {
         match (self, log2) {
-            (Self::USUAL, 2) => Self::USUAL.packed(corners, row, 2),
-            (Self::USUAL, 3) => Self::USUAL.packed(corners, row, 3),
-            (Self::NARROW, 2) => Self::NARROW.packed(corners, row, 2),
-            _ => self.any_tile(corners, row, log2),
+            (Self::USUAL, 3) => Self::USUAL.packed(patch, row, 3),
+            _ => self.any_tile(patch, row, log2),
         }
     }
 
     #[inline(never)]
-    fn any_tile(self, corners: Corners, row: u16, log2: u32) -> Tile {
-        self.packed(corners, row, log2)
+    fn any_tile(self, patch: &Patch, row: u16, log2: u32) -> Tile {
+        self.packed(patch, row, log2)
     }
 
+    /// [`Window::tile`], written out where the window and `log2` are known.
     #[inline(always)]
-    fn packed(self, [a, b, c, d]: Corners, row: u16, log2: u32) -> Tile {
-        let (above_u, above_v) = (b.u.wrapping_sub(a.u), b.v.wrapping_sub(a.v));
-        let (below_u, below_v) = (d.u.wrapping_sub(c.u), d.v.wrapping_sub(c.v));
-        Tile {
-            at: self.pack(a.u, a.v.wrapping_sub(i32::from(row).wrapping_shl(16)), 0),
-            step: self.pack(above_u, above_v, log2),
-            down: self.pack(c.u.wrapping_sub(a.u), c.v.wrapping_sub(a.v), log2),
-            turn: self.pack(below_u.wrapping_sub(above_u), below_v.wrapping_sub(above_v), log2.wrapping_mul(2)),
+    pub fn packed(self, patch: &Patch, row: u16, log2: u32) -> Tile {
+        let [u, v] = patch.axes().map(|(corners, sums)| Middle::new(corners, sums, log2));
+        let first = i32::from(row).wrapping_shl(16);
+        let v = v.plus(first.wrapping_neg()).lanes(log2, |x, log2| self.lane::<true>(x, log2));
+        v.plus(&u.lanes(log2, |x, log2| self.lane::<false>(x, log2))).from_middle(log2)
+    }
+}
+
+/// How a number goes around the middle of a patch.
+pub struct Middle {
+    /// In the middle.
+    at: i32,
+    /// How far it is from there to the next pixel, times twice as many as there are in a row,
+    step: i32,
+    /// and to the next row, likewise;
+    down: i32,
+    /// how the former changes from row to row, times all pixels of the patch.
+    turn: i32,
+    /// How both change from step to step, times four times as many.
+    bend: i32,
+    fall: i32,
+}
+
+impl Middle {
+    /// So much more all over.
+    #[must_use]
+    #[inline(always)]
+    pub const fn plus(self, more: i32) -> Self {
+        Self { at: self.at.wrapping_add(more), ..self }
+    }
+
+    /// Given the number at the corners, and the sums of second differences.
+    #[inline(always)]
+    pub const fn new([a, b, c, d]: [i32; 4], [across, down]: [i32; 2], log2: u32) -> Self {
+        let (above, below, left) = (b.wrapping_sub(a), d.wrapping_sub(c), c.wrapping_sub(a));
+        let (sum, turn, twice) = (above.wrapping_add(below), below.wrapping_sub(above), left.wrapping_mul(2));
+        // The middle is an eighth of a mean second difference off the mean of the corners, and a step from it half a pixel's such off the mean one.
+        let part = log2.wrapping_add(2);
+        Self {
+            at: a.wrapping_add(sum.wrapping_add(twice) >> 2).wrapping_sub(across >> 5).wrapping_sub(down >> 5),
+            step: sum.wrapping_add(across.wrapping_shr(part)),
+            down: twice.wrapping_add(turn).wrapping_add(down.wrapping_shr(part)),
+            turn,
+            bend: across,
+            fall: down,
         }
+    }
+
+    /// The same in its lane, of a tile of 2^`log2` pixels.
+    #[inline(always)]
+    pub fn lanes(&self, log2: u32, lane: impl Fn(i32, u32) -> u32) -> Tile {
+        let twice = log2.wrapping_mul(2);
+        let [step, down] = [self.step, self.down].map(|step| lane(step, log2.wrapping_add(1)));
+        let [bend, fall] = [self.bend, self.fall].map(|change| lane(change, twice.wrapping_add(2)));
+        Tile { at: lane(self.at, 0), down, fall, step, turn: lane(self.turn, twice), bend }
     }
 }
 
@@ -139,14 +223,25 @@ impl Room {
         low.u >= self.margin && high.u < self.right && low.v.wrapping_sub(first) >= self.margin && high.v.wrapping_sub(first) < self.end
     }
 
-    /// The first row of a window that holds a tile of these corners and begins or ends there, so that it has room where a run is heading; `None`
-    /// where there is no such.
+    /// The first row of a window that holds `patch` and begins or ends there, `more` before or after it, so that it has room where a run is heading;
+    /// `None` where there is no such.
     #[must_use]
     #[inline]
-    pub fn onwards(&self, corners: &Corners) -> Option<u16> {
-        let [a, b, c, d] = corners;
-        let bounds = Bounds::around(corners);
-        if b.v.wrapping_add(d.v) >= a.v.wrapping_add(c.v) { self.row(&bounds) } else { self.row_to(&bounds) }
+    pub fn onwards(&self, patch: &Patch, more: i32) -> Option<u16> {
+        let [a, b, c, d] = patch.corners;
+        let bounds = patch.bounds();
+        let row = if b.v.wrapping_add(d.v) >= a.v.wrapping_add(c.v) {
+            bounds.low.v.wrapping_sub(self.margin).wrapping_sub(more) >> 16
+        } else {
+            self.first_to(bounds.high.v.wrapping_add(more))
+        };
+        self.held(&bounds, row)
+    }
+
+    /// The first row of a window that ends where `high` does.
+    #[inline(always)]
+    const fn first_to(&self, high: i32) -> i32 {
+        (high.wrapping_add(self.margin) >> 16).wrapping_add(1).wrapping_sub(1i32.wrapping_shl(self.window.rows_log2))
     }
 
     /// The first row of a window that holds what lies within `bounds` and begins there; `None` where there is no such.
@@ -154,14 +249,6 @@ impl Room {
     #[inline(always)]
     pub fn row(&self, bounds: &Bounds) -> Option<u16> {
         self.held(bounds, bounds.low.v.wrapping_sub(self.margin) >> 16)
-    }
-
-    /// Likewise of one that ends where they do.
-    #[must_use]
-    #[inline(always)]
-    pub fn row_to(&self, bounds: &Bounds) -> Option<u16> {
-        let end = (bounds.high.v.wrapping_add(self.margin) >> 16).wrapping_add(1);
-        self.held(bounds, end.wrapping_sub(1i32.wrapping_shl(self.window.rows_log2)))
     }
 
     /// The row of the picture that comes closest to `row`, if the window from there on holds what lies within `bounds`.
@@ -172,15 +259,10 @@ impl Room {
     }
 }
 
-/// `x` / 2^`log2`, to the nearest.
-#[inline(always)]
-const fn rounded(x: i32, log2: u32) -> i32 {
-    x.wrapping_add(1i32.wrapping_shl(log2) >> 1).wrapping_shr(log2)
-}
-
 /// How far positions of tiles of 2^`log2` pixels keep from the edges of picture and window, Q16 texels, beside what pixels reach to: rounding moves
-/// them by less. The steps between their pixels, and from row to row, are off by up to half a unit, 1/512 texel at most; all of a tile's add up.
+/// them by less. All numbers of a tile are off by up to half a unit, 1/512 texel at most, those of curves by a whole one; the tile's last pixel by half
+/// its pixels, and as many for curves.
 #[must_use]
 pub const fn margin(log2: u32) -> i32 {
-    1i32.wrapping_shl(log2.wrapping_mul(2).wrapping_add(7))
+    1i32.wrapping_shl(log2.wrapping_mul(2).wrapping_add(8))
 }

@@ -13,8 +13,6 @@ pub struct Work {
     pub record_bytes: u32,
     /// Layers interpolated in time.
     pub layers: u32,
-    /// Layers worked out halfway between two rows of nodes.
-    pub middles: u32,
     /// Pixels drawn in smooth cells.
     pub smooth_pixels: u32,
     /// Pixels drawn in torn cells.

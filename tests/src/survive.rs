@@ -81,7 +81,6 @@ fn bounded(bundle: &Bundle<'_>, work: Work, rows: u32) {
         ("bytes of records", work.record_bytes, (keys + 1).saturating_mul(record)),
         // Rows are drawn apart from each other here: each loads four rows of nodes.
         ("layers", work.layers, rows.saturating_mul(4 * layers)),
-        ("layers halfway", work.middles, rows.saturating_mul(2 * layers)),
         ("pixels", work.smooth_pixels.saturating_add(work.torn_pixels), pixels),
         ("coverage tests", work.coverage_tests, work.torn_pixels.saturating_mul(u32::from(limits.cell_sheets) - 1)),
         ("pixels of four", work.smoothed_pixels, 0),

@@ -15,7 +15,6 @@ use core::hint::black_box;
 use cortex_m::peripheral::Peripherals;
 use cortex_m_rt::entry;
 use cortex_m_semihosting::debug::{self, EXIT_FAILURE};
-use cubist_core::format::SPACE_CUBIC;
 use cubist_core::{Bundle, Frame, Player, Work};
 use text::Line;
 
@@ -89,8 +88,8 @@ struct Rows {
 fn rows(player: &mut Player<'_>, row: &mut [u16], clock: &mut Clock) -> Rows {
     let (height, cell) = (player.bundle().size().1, 1u32 << player.bundle().path().cell_log2);
     let mut found = Rows { checksum: 0x811c_9dc5, loading: 0, fit: Fit::default() };
-    // Where space is cubic there is something to work out for each half of a row of cells, else for each row of cells.
-    let strip = if player.bundle().path().space == SPACE_CUBIC { cell / 2 } else { cell };
+    // There is something to work out for each row of blocks: cells, or parts of larger ones.
+    let strip = cell.min(8);
     for top in (0..height).step_by(strip as usize) {
         let (mut first, mut others) = (0, 0);
         let bottom = height.min(top + strip);
