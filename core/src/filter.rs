@@ -231,7 +231,7 @@ mod tests {
         let texture = Texture { texels: &[], mask: &[], width_log2: WIDTH, height: 1 << ROWS };
         let colour = |index: usize| (index as u16).wrapping_mul(40_503);
         let [even, odd] = filter.offsets(WIDTH);
-        let at = u << (fraction(WIDTH) + ROWS) | v;
+        let at = u << fraction(WIDTH).wrapping_add(ROWS) | v;
         let moved = Packed::<WIDTH, ROWS>(at.wrapping_add(if x == 0 { even } else { odd }));
         let uv = PlayUv { u: (u << 7) as i32, v: (v << 7) as i32 };
         assert_eq!(filter.packed(moved, colour), filter.at(uv, x, &texture, colour), "{uv:?}");

@@ -152,8 +152,8 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, space: &mut Workspace<'
     let plan = &mut space.plan;
     let places = grid.columns.saturating_mul(blocks);
     (plan.tile, plan.run, plan.mixed) = (cutter.take::<Tile>(places), cutter.take::<Run>(places), cutter.take::<Mixed>(places));
-    // A sheet shows in every block of its cell at most.
-    plan.side = cutter.take::<Side>(usize::from(limits.row_sheets).saturating_mul(blocks));
+    // Most sheets of larger cells show in one of two blocks, or in few; what there is no room for is drawn pixel by pixel.
+    plan.side = cutter.take::<Side>(usize::from(limits.row_sheets) / blocks);
 }
 
 impl Bundle<'_> {

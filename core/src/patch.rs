@@ -65,19 +65,35 @@ impl Patch {
     /// Of its parts of 2^`part` pixels that whose first pixel is `from` pixels to the right and down; it is 2^`log2` pixels wide and high.
     #[must_use]
     #[inline(always)]
-    pub fn part(&self, from: [u32; 2], part: u32, log2: u32) -> Self {
-        if part == log2 { *self } else { self.cut(from, part, log2) }
+    pub fn part(&self, [x, y]: [u32; 2], part: u32, log2: u32) -> Self {
+        let mut patch = *self;
+        for bit in (part..log2).rev() {
+            patch = patch.quarter([x, y].map(|pixels| pixels.wrapping_shr(bit) & 1 == 1));
+        }
+        patch
     }
 
-    // Larger cells are rare.
+    /// Its quarter to the left or to the right, above or below.
     #[inline(never)]
-    fn cut(&self, [x, y]: [u32; 2], part: u32, log2: u32) -> Self {
-        let ([u, v], side) = (self.forms(log2), 1u32.wrapping_shl(part));
-        let at = |x: u32, y: u32| PlayUv { u: u.at([x, y]), v: v.at([x, y]) };
-        let (right, low) = (x.wrapping_add(side), y.wrapping_add(side));
-        let twice = log2.wrapping_sub(part).wrapping_mul(2);
-        let smaller = |sum: PlayUv| PlayUv { u: sum.u.wrapping_shr(twice), v: sum.v.wrapping_shr(twice) };
-        Self { corners: [at(x, y), at(right, y), at(x, low), at(right, low)], across: smaller(self.across), down: smaller(self.down) }
+    fn quarter(&self, [right, low]: [bool; 2]) -> Self {
+        let [(u, sums_u), (v, sums_v)] = self.axes();
+        // How far the middles of edges are off the means of their ends, both ways.
+        let halves = |[a, b, c, d]: [i32; 4], [across, down]: [i32; 2]| {
+            let middle = |x: i32, y: i32, sum: i32| (x.wrapping_add(y) >> 1).wrapping_sub(sum >> 5);
+            let (left, end) = (middle(a, c, down), middle(b, d, down));
+            let centre = middle(left, end, across);
+            let (top, bottom) = (middle(a, b, across), middle(c, d, across));
+            match (right, low) {
+                (false, false) => [a, top, left, centre],
+                (true, false) => [top, b, centre, end],
+                (false, true) => [left, centre, c, bottom],
+                (true, true) => [centre, end, bottom, d],
+            }
+        };
+        let ([a, b, c, d], [e, f, g, h]) = (halves(u, sums_u), halves(v, sums_v));
+        let corners = [PlayUv { u: a, v: e }, PlayUv { u: b, v: f }, PlayUv { u: c, v: g }, PlayUv { u: d, v: h }];
+        let less = |sum: PlayUv| PlayUv { u: sum.u >> 2, v: sum.v >> 2 };
+        Self { corners, across: less(self.across), down: less(self.down) }
     }
 }
 

@@ -101,13 +101,14 @@ impl Plan<'_> {
             along = stretch.cells;
         }
         while along < stretch.cells && across.left < across.width {
-            // In pictures 512 and 256 wide, as most are, and cells of eight pixels; others go by `append` alone. Likewise the cell that the screen's edge
-            // cuts.
-            let most = (across.width.saturating_sub(across.left) >> 3).min(stretch.cells.wrapping_sub(along).into());
-            let more = if most > 0 && across.blocks == 1 && across.log2 == 3 { self.extend(across, sheet, along, most) } else { 0 };
+            // In pictures 512 and 256 wide, as most are, and cells of eight or sixteen pixels; others go by `append` alone. Likewise the cell that the
+            // screen's edge cuts.
+            let most =
+                across.width.saturating_sub(across.left).wrapping_shr(across.site.log2()).min(stretch.cells.wrapping_sub(along).into());
+            let more = if most > 0 { self.extend(across, sheet, along, most as usize) } else { 0 };
             if more > 0 {
                 along = along.wrapping_add(more);
-                across.step(more.into());
+                across.step(across.blocks.wrapping_mul(more.into()));
                 continue;
             }
             let here = sheet.further(along);
@@ -159,36 +160,40 @@ impl Plan<'_> {
     }
 
     /// Appends smooth cells of `sheet`, from the `along`-th of its stretch on, to a run, `most` at most; returns how many.
-    fn extend(&mut self, across: &Across<'_, '_, '_>, sheet: &Sheet, along: u16, most: u32) -> u16 {
+    fn extend(&mut self, across: &Across<'_, '_, '_>, sheet: &Sheet, along: u16, most: usize) -> u16 {
         let Some(room) = &across.room else { return 0 };
         let ([top, bottom], [above, below]) = (across.site.rows, sheet.further(along).nodes());
         let lines = [top.from(above), bottom.from(below)];
-        let grow = |plan: &mut Self| match room.window {
-            Window::USUAL => plan.grow::<9>(most as usize, room.margin, lines),
-            Window::NARROW => plan.grow::<8>(most as usize, room.margin, lines),
+        let low = across.offset()[1] > 0;
+        let grow = |plan: &mut Self| match (room.window, across.site.log2()) {
+            (Window::USUAL, 3) => plan.grow::<9, 1>(most, room.margin, low, lines),
+            (Window::NARROW, 3) => plan.grow::<8, 1>(most, room.margin, low, lines),
+            (Window::USUAL, 4) => plan.grow::<9, 2>(most, room.margin, low, lines),
+            (Window::NARROW, 4) => plan.grow::<8, 2>(most, room.margin, low, lines),
             _ => 0,
         };
         let mut more = if self.follows(sheet.label(), across.block) { grow(self) } else { 0 };
-        if more == 0 && self.begin(room, sheet.label(), across.block, &across.site.block(&sheet.further(along), [0; 2]), BULGE) {
+        if more == 0 && self.begin(room, sheet.label(), across.block, &Patch::new(across.site.rows, &sheet.further(along)), BULGE) {
             more = grow(self);
         }
         more
     }
 
-    /// Appends cells of eight pixels to the last run, which they follow, as long as they fit into its window, `most` at most; returns how many. The
-    /// `lines` above and below start at their left corners.
+    /// Appends cells of so many `TILES` a row of blocks to the last run, which they follow, as long as they fit into its window, `most` at most; returns
+    /// how many. The `lines` above and below start at their left corners; `low`: of cells of two rows of blocks it is the lower one.
     #[inline(never)]
-    fn grow<const WIDTH: u32>(&mut self, most: usize, margin: i32, lines: [&[Node]; 2]) -> u16 {
+    fn grow<const WIDTH: u32, const TILES: usize>(&mut self, most: usize, margin: i32, low: bool, lines: [&[Node]; 2]) -> u16 {
         let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return 0 };
-        let Some(slots) = self.tile.get_mut(self.tiles..) else { return 0 };
+        let Some(slots) = self.tile.get_mut(self.tiles..).map(|slots| slots.as_chunks_mut::<TILES>().0) else { return 0 };
         let Some(slots) = slots.get_mut(..most) else { return 0 };
         let window = Window { width_log2: WIDTH, ..Window::USUAL };
         let margin = margin.wrapping_add(BULGE);
         // An axis after the other: what is known of both at a time would not fit a small processor's registers.
-        let done = lay::<true>(slots, lines, i32::from(run.row).wrapping_shl(16), margin, window);
-        let done = lay::<false>(slots.get_mut(..done).unwrap_or(&mut []), lines, 0, margin, window);
-        run.count = run.count.wrapping_add(done as u16);
-        self.tiles = self.tiles.wrapping_add(done);
+        let done = lay::<true, TILES>(slots, lines, i32::from(run.row).wrapping_shl(16), margin, low, window);
+        let done = lay::<false, TILES>(slots.get_mut(..done).unwrap_or(&mut []), lines, 0, margin, low, window);
+        let tiles = done.wrapping_mul(TILES);
+        run.count = run.count.wrapping_add(tiles as u16);
+        self.tiles = self.tiles.wrapping_add(tiles);
         done as u16
     }
 
@@ -245,10 +250,17 @@ impl Plan<'_> {
     }
 }
 
-/// Fills `slots` with v (`DOWN`), or adds u, of tiles of eight pixels between nodes above and below, as long as they lie a `margin` inside the window,
-/// which begins at `first`; returns how many do.
+/// Fills `slots` with v (`DOWN`), or adds u, of the tiles of cells between nodes above and below, as long as these lie a `margin` inside the window,
+/// which begins at `first`; returns how many do. Of cells of two tiles a row, `low` says which row it is.
 #[inline(always)]
-fn lay<const DOWN: bool>(slots: &mut [Tile], [above, below]: [&[Node]; 2], first: i32, margin: i32, window: Window) -> usize {
+fn lay<const DOWN: bool, const TILES: usize>(
+    slots: &mut [[Tile; TILES]],
+    [above, below]: [&[Node]; 2],
+    first: i32,
+    margin: i32,
+    low: bool,
+    window: Window,
+) -> usize {
     let one = |layer: Layer| if DOWN { layer.uv().v } else { layer.uv().u };
     let log2 = if DOWN { window.rows_log2 } else { window.width_log2 };
     // From the margin on: inside is what is not negative and below the room, one comparison for both.
@@ -261,7 +273,7 @@ fn lay<const DOWN: bool>(slots: &mut [Tile], [above, below]: [&[Node]; 2], first
     let Some((above, below)) = edges.next() else { return 0 };
     let ([mut a, mut c], mut left) = ([at(above), at(below)], sums(above, below));
     let mut done = 0usize;
-    for (slot, (above, below)) in slots.iter_mut().zip(edges) {
+    for (slots, (above, below)) in slots.iter_mut().zip(edges) {
         let ([b, d], right) = ([at(above), at(below)], sums(above, below));
         let bends = [left[0].wrapping_add(right[0]), left[1].wrapping_add(right[1])];
         // It bulges by a 32nd of each.
@@ -270,8 +282,13 @@ fn lay<const DOWN: bool>(slots: &mut [Tile], [above, below]: [&[Node]; 2], first
         if b as u32 >= room || d as u32 >= room || bulges >= 2 * MOST {
             break;
         }
-        let tile = Middle::new([a, b, c, d], bends, 3).plus(margin).lanes(3, |x, log2| window.lane::<DOWN>(x, log2));
-        *slot = if DOWN { tile } else { slot.plus(&tile).from_middle(3) };
+        let log2 = if TILES == 1 { 3 } else { 4 };
+        let cell = Middle::new([a, b, c, d], bends, log2).plus(margin);
+        for (slot, right) in slots.iter_mut().zip([false, true]) {
+            let block = if TILES == 1 { cell } else { cell.quarter(right, low, log2) };
+            let tile = block.lanes(3, |x, log2| window.lane::<DOWN>(x, log2));
+            *slot = if DOWN { tile } else { slot.plus(&tile).from_middle(3) };
+        }
         (a, c, left) = (b, d, right);
         done = done.wrapping_add(1);
     }

@@ -140,6 +140,7 @@ impl Window {
 }
 
 /// How a number goes around the middle of a patch.
+#[derive(Clone, Copy, Debug)]
 pub struct Middle {
     /// In the middle.
     at: i32,
@@ -176,6 +177,34 @@ impl Middle {
             turn,
             bend: across,
             fall: down,
+        }
+    }
+
+    /// Of the patch's quarter to the left or to the right, above or below; the patch is 2^`log2` pixels wide and high.
+    #[must_use]
+    #[inline(always)]
+    pub const fn quarter(&self, right: bool, low: bool, log2: u32) -> Self {
+        let Self { at, step, down, turn, bend, fall } = *self;
+        // What is a quarter of the way off the middle, on either side.
+        const fn aside(x: i32, right: bool) -> i32 {
+            if right { x } else { x.wrapping_neg() }
+        }
+        // A curve there, x (x - 1) / 2 times a second difference.
+        const fn curve(change: i32, right: bool, log2: u32) -> i32 {
+            (change >> 7).wrapping_sub(aside(change.wrapping_shr(log2.wrapping_add(5)), right))
+        }
+        Self {
+            at: at
+                .wrapping_add(aside(step >> 3, right))
+                .wrapping_add(aside(down >> 3, low))
+                .wrapping_add(aside(turn >> 4, right == low))
+                .wrapping_add(curve(bend, right, log2))
+                .wrapping_add(curve(fall, low, log2)),
+            step: (step >> 1).wrapping_add(aside(turn >> 2, low)).wrapping_add(aside(bend >> 4, right)),
+            down: (down >> 1).wrapping_add(aside(turn >> 2, right)).wrapping_add(aside(fall >> 4, low)),
+            turn: turn >> 2,
+            bend: bend >> 2,
+            fall: fall >> 2,
         }
     }
 
