@@ -88,9 +88,10 @@ pub struct Bake {
     pub time: Option<Time>,
     /// How surfaces bend between the corners of cells [default: linear where that is worth as much, else cubic].
     ///
-    /// Cubic halves every cell along curves through the corners around it: large flat surfaces seen at a slant want that. Linear takes less memory, and
-    /// in cells of 4 and 8 pixels draws in a fifth to a third fewer instructions; on most models of many small faces nothing shows the difference.
-    /// Without this both are made in such cells, and the report has the figures of both. Searches (--budget, --psnr) take cubic; --ram tries what fits.
+    /// Cubic bends every cell evenly across and down, by as much as the corners around it say: large flat surfaces seen at a slant want that. Linear
+    /// takes less memory, and in cells of 4 and 8 pixels draws in a fifth to a third fewer instructions; on most models of many small faces nothing
+    /// shows the difference. Without this both are made in such cells, and the report has the figures of both. Searches (--budget, --psnr) take
+    /// cubic; --ram tries what fits.
     #[arg(long, value_enum, value_name = "KIND")]
     pub space: Option<Space>,
     /// Largest side of the source image, texels, 64 to 1024.
@@ -202,7 +203,7 @@ pub enum Time {
 pub enum Space {
     /// Not at all: straight from corner to corner.
     Linear,
-    /// On a curve through four corners.
+    /// Evenly, by as much as the corners around say.
     Cubic,
 }
 

@@ -11,6 +11,7 @@ pub mod chart;
 pub mod choose;
 mod climb;
 mod cuts;
+mod element;
 pub mod encode;
 pub mod fields;
 pub mod files;

@@ -7,7 +7,7 @@ use crate::bake::Coverage;
 use crate::fields::Fields;
 use crate::fit::Fit;
 use crate::gbuffer::GBuffer;
-use crate::patch::{self, AtPoints, Patch};
+use crate::patch::{self, Patch, Values};
 use crate::sheets::{KeyGrid, Layers, Sheets};
 use cubist_core::format::{MAX_SHEETS, SPACE_LINEAR, TIME_LINEAR};
 use cubist_core::lists::{BOTH, CHART, FIELD};
@@ -120,17 +120,17 @@ fn observe(evidence: &Evidence<'_>, index: usize, list: &[u8]) -> Vec<Group> {
     for frame in grid.frames_of(interval) {
         let weights = grid.weights(interval, frame, grid.time);
         let linear = grid.weights(interval, frame, TIME_LINEAR);
-        let points = |patches: &[Patch], values: &[[f32; 2]], weights: &[[f32; 4]; 4]| -> Vec<AtPoints> {
-            patches.iter().map(|patch| patch.points(values, weights)).collect()
+        let values = |patches: &[Patch], of: &[[f32; 2]], weights: &[[f32; 4]; 4]| -> Vec<Values> {
+            patches.iter().map(|patch| patch.values(of, weights)).collect()
         };
-        let positions = points(&position_patches, &fit.uv, &weights);
-        let distances = fields.map(|fields| points(&field_patches, &fields.distance, &linear));
+        let positions = values(&position_patches, &fit.uv, &weights);
+        let distances = fields.map(|fields| values(&field_patches, &fields.distance, &linear));
         grid.each_pixel(frame, cell, |pixel, at| {
             let sheet = list.iter().position(|&label| u16::from(label) == gbuffer.label[pixel]).unwrap_or(NO_SHEET);
             let right = image.colour_at(gbuffer.uv[pixel]);
             let mut costs = [0; MAX_SHEETS];
-            let around = patch::around(at);
-            let mix = |points: &AtPoints| patch::value(points, around);
+            let shares = patch::shares(at);
+            let mix = |values: &Values| patch::value(values, &shares);
             let mut covering = 0u32;
             for (place, &label) in list.iter().enumerate() {
                 let uv = mix(&positions[place]);

@@ -1,110 +1,109 @@
-//! Patches: one sheet of a cell in one key interval, with the layers it is interpolated from, as playback does it: every layer in time
-//! first, then the cell's edges and its middles in space, then straight lines between those.
+//! Patches: one sheet of a cell in one key interval, with the layers it is made of, as playback makes it (FORMAT.md, Space): every layer in time
+//! first, then one smooth patch in space, which bends evenly across and evenly down, by as much as the nodes around say.
 //! Layers come from `sheets`; `fit`, `fields` and `order` ask here what the player will show.
 
-use crate::sheets::{Chain, KeyGrid, Layers};
+use crate::sheets::{Chain, KeyGrid, Layers, bilinear};
 use cubist_core::format::SPACE_CUBIC;
 
-/// Nodes that a patch may look at: four rows of four, the cell's corners in the middle.
-pub const NODES: usize = 16;
+/// Nodes that a patch may look at: the cell's corners, and the ones before and after them on the rows and columns that they stand in; row by row,
+/// two, four, four and two.
+pub const NODES: usize = 12;
 /// The nodes at the cell's corners: top left, top right, bottom left, bottom right.
-pub const CORNERS: [usize; 4] = [5, 6, 9, 10];
-/// Points of a patch: three rows of three, the cell's corners, the middles of its edges and its own.
-pub const POINTS: usize = 9;
+pub const CORNERS: [usize; 4] = [3, 4, 7, 8];
+/// Values of a patch: those at its corners, and what it has at its middle beyond their mean, for it bends across and for it bends down.
+pub const VALUES: usize = 6;
 
-/// The weights of four values in a row in the one halfway between the inner two (`cubist_core::fixed::middle`).
-fn halfway(before: bool, after: bool) -> [f32; 4] {
-    match (before, after) {
-        (true, true) => [-0.0625, 0.5625, 0.5625, -0.0625],
-        (true, false) => [-0.125, 0.75, 0.375, 0.0],
-        (false, true) => [0.0, 0.375, 0.75, -0.125],
-        (false, false) => [0.0, 0.5, 0.5, 0.0],
-    }
-}
+/// Column and row of every node, counted from those before the cell's.
+const PLACES: [[usize; 2]; NODES] = [[1, 0], [2, 0], [0, 1], [1, 1], [2, 1], [3, 1], [0, 2], [1, 2], [2, 2], [3, 2], [1, 3], [2, 3]];
+/// The nodes that tell how a patch bends across, and those that tell how it bends down: the first of each two neighbours.
+const PAIRS: [[usize; 4]; 2] = [[2, 4, 6, 8], [0, 3, 7, 10]];
 
-/// How a patch's points follow from its nodes.
-#[derive(Clone, Copy, Debug)]
-pub struct Stencil {
-    /// For every column of nodes, the weights of its rows in the value halfway down the cell; none where there is no such value.
-    down: [[f32; 4]; 4],
-    /// For the cell's upper edge, halfway down, and its lower edge, the weights of the columns in the value halfway across.
-    across: [[f32; 4]; 3],
-}
-
-/// A pair of values at every node.
+/// A pair of numbers at every node.
 pub type AtNodes = [[f32; 2]; NODES];
-/// A pair of values at every point.
-pub type AtPoints = [[f32; 2]; POINTS];
+/// A pair of numbers for every value.
+pub type Values = [[f32; 2]; VALUES];
+
+/// The weights of four nodes in a row in what the edge between the inner two gives to the middle of a patch: -1/32 of the second differences that
+/// the edge takes, of which a patch has four.
+fn bend(before: bool, after: bool) -> [f32; 4] {
+    match (before, after) {
+        (true, true) => [-1.0, 1.0, 1.0, -1.0],
+        (true, false) => [-2.0, 4.0, -2.0, 0.0],
+        (false, true) => [0.0, -2.0, 4.0, -2.0],
+        (false, false) => [0.0; 4],
+    }
+    .map(|weight| weight / 32.0)
+}
 
 fn add(to: &mut [f32; 2], weight: f32, value: [f32; 2]) {
     to[0] += weight * value[0];
     to[1] += weight * value[1];
 }
 
+/// How a patch's values follow from its nodes.
+#[derive(Clone, Copy, Debug)]
+pub struct Stencil {
+    /// The weights of the nodes of [`PAIRS`] in the last two values.
+    bends: [[[f32; 2]; 4]; 2],
+}
+
 impl Stencil {
-    /// The stencil of a patch that is carried at the nodes of `present`, one bit each.
+    /// The stencil of a patch that is carried at the nodes of `present`, one bit each; at the corners it always is.
     #[must_use]
     pub fn new(present: u32) -> Self {
-        let at = |row: usize, column: usize| present >> (4 * row + column) & 1 == 1;
-        let inside = |column: usize| at(1, column) && at(2, column);
-        let down = std::array::from_fn(|column| if inside(column) { halfway(at(0, column), at(3, column)) } else { [0.0; 4] });
-        let across = [halfway(at(1, 0), at(1, 3)), halfway(inside(0), inside(3)), halfway(at(2, 0), at(2, 3))];
-        Self { down, across }
+        let at = |node: usize| present >> node & 1 == 1;
+        let [[a, b, c, d], [e, f, g, h]] = [bend(at(2), at(5)), bend(at(6), at(9))];
+        let [left, right] = [bend(at(0), at(10)), bend(at(1), at(11))];
+        Self { bends: [[[a, b], [c, d], [e, f], [g, h]], [0, 1, 2, 3].map(|row: usize| [left[row], right[row]])] }
     }
 
-    /// The points, given the nodes.
+    /// The values, given the nodes.
     #[must_use]
-    pub fn points(&self, nodes: &AtNodes) -> AtPoints {
-        let mut between = [[0.0; 2]; 4];
-        for (column, sum) in between.iter_mut().enumerate() {
-            for row in 0..4 {
-                add(sum, self.down[column][row], nodes[4 * row + column]);
+    pub fn values(&self, nodes: &AtNodes) -> Values {
+        let bent = [0, 1].map(|way: usize| {
+            let mut sums = [[0.0; 2]; 2];
+            for (&pair, weights) in PAIRS[way].iter().zip(&self.bends[way]) {
+                add(&mut sums[0], weights[0], nodes[pair]);
+                add(&mut sums[1], weights[1], nodes[pair + 1]);
             }
-        }
-        let rows = [[nodes[4], nodes[5], nodes[6], nodes[7]], between, [nodes[8], nodes[9], nodes[10], nodes[11]]];
-        let mut points = [[0.0; 2]; POINTS];
-        for (row, values) in rows.iter().enumerate() {
-            points[3 * row] = values[1];
-            points[3 * row + 2] = values[2];
-            for (&weight, &value) in self.across[row].iter().zip(values) {
-                add(&mut points[3 * row + 1], weight, value);
-            }
-        }
-        points
+            [sums[0][0] + sums[1][0], sums[0][1] + sums[1][1]]
+        });
+        let [a, b, c, d] = CORNERS.map(|node| nodes[node]);
+        [a, b, c, d, bent[0], bent[1]]
     }
 
-    /// The transpose of [`Stencil::points`].
+    /// The transpose of [`Stencil::values`].
     #[must_use]
-    pub fn transposed(&self, points: &AtPoints) -> AtNodes {
+    pub fn transposed(&self, values: &Values) -> AtNodes {
         let mut nodes = [[0.0; 2]; NODES];
-        let mut between = [[0.0; 2]; 4];
-        for row in 0..3 {
-            let mut values = [[0.0; 2], points[3 * row], points[3 * row + 2], [0.0; 2]];
-            for (value, &weight) in values.iter_mut().zip(&self.across[row]) {
-                add(value, weight, points[3 * row + 1]);
-            }
-            if row == 1 {
-                between = values;
-            } else {
-                nodes[2 * row + 4..2 * row + 8].copy_from_slice(&values);
-            }
+        for (node, &value) in CORNERS.into_iter().zip(values) {
+            nodes[node] = value;
         }
-        for (column, &value) in between.iter().enumerate() {
-            for row in 0..4 {
-                add(&mut nodes[4 * row + column], self.down[column][row], value);
+        for (way, &value) in values[CORNERS.len()..].iter().enumerate() {
+            for (&pair, weights) in PAIRS[way].iter().zip(&self.bends[way]) {
+                add(&mut nodes[pair], weights[0], value);
+                add(&mut nodes[pair + 1], weights[1], value);
             }
         }
         nodes
     }
 }
 
-/// The points around a position in a cell (across and down, 0..1), and their weights.
+/// The shares of a patch's values at a position in its cell (across and down, 0..=1).
 #[must_use]
-pub fn around([x, y]: [f32; 2]) -> ([usize; 4], [f32; 4]) {
-    let (right, lower) = (usize::from(x >= 0.5), usize::from(y >= 0.5));
-    let first = 3 * lower + right;
-    let weights = crate::sheets::bilinear([2.0 * x - right as f32, 2.0 * y - lower as f32]);
-    ([first, first + 1, first + 3, first + 4], weights)
+pub fn shares([x, y]: [f32; 2]) -> [f32; VALUES] {
+    let [a, b, c, d] = bilinear([x, y]);
+    [a, b, c, d, 4.0 * x * (1.0 - x), 4.0 * y * (1.0 - y)]
+}
+
+/// What a patch shows where its `values` have these `shares`.
+#[must_use]
+pub fn value(values: &Values, shares: &[f32; VALUES]) -> [f32; 2] {
+    let mut sum = [0.0; 2];
+    for (&value, &share) in values.iter().zip(shares) {
+        add(&mut sum, share, value);
+    }
+    sum
 }
 
 /// One sheet of a cell in one interval.
@@ -112,12 +111,12 @@ pub fn around([x, y]: [f32; 2]) -> ([usize; 4], [f32; 4]) {
 pub struct Patch {
     /// The layers of every node that carries the sheet.
     pub chains: [Option<Chain>; NODES],
-    /// How its points follow from them.
+    /// How its values follow from them.
     pub stencil: Stencil,
 }
 
 impl Patch {
-    /// The patch of `label` in `cell` and `interval`, interpolated in `time` and `space`.
+    /// The patch of `label` in `cell` and `interval`, interpolated in `time` and `space`: where space is linear it looks at its corners alone.
     #[must_use]
     pub fn new(grid: &KeyGrid, layers: &Layers, [interval, cell]: [usize; 2], label: u8, [time, space]: [u8; 2]) -> Self {
         let keys = grid.keys_around(interval, time);
@@ -127,8 +126,9 @@ impl Patch {
             if space != SPACE_CUBIC && !CORNERS.contains(&node) {
                 return None;
             }
-            let column = (column + node % 4).checked_sub(1).filter(|&column| column < columns)?;
-            let row = (row + node / 4).checked_sub(1).filter(|&row| row < rows)?;
+            let [across, down] = PLACES[node];
+            let column = (column + across).checked_sub(1).filter(|&column| column < columns)?;
+            let row = (row + down).checked_sub(1).filter(|&row| row < rows)?;
             let layer = keys.map(|key| layers.find(key? * nodes + row * columns + column, label));
             // What is not carried at both ends of the interval is not there during it.
             (layer[1].is_some() && layer[2].is_some()).then_some(Chain { layer })
@@ -137,54 +137,91 @@ impl Patch {
         Self { chains, stencil: Stencil::new(present) }
     }
 
-    /// The patch's points at a moment, given all layers' `values` and the keys' weights.
+    /// The patch's values at a moment, given all layers' positions or distances `of` and the keys' weights.
     #[must_use]
-    pub fn points(&self, values: &[[f32; 2]], weights: &[[f32; 4]; 4]) -> AtPoints {
-        self.stencil.points(&self.chains.map(|chain| chain.map_or([0.0; 2], |chain| chain.value(values, weights))))
+    pub fn values(&self, of: &[[f32; 2]], weights: &[[f32; 4]; 4]) -> Values {
+        self.stencil.values(&self.chains.map(|chain| chain.map_or([0.0; 2], |chain| chain.value(of, weights))))
     }
-}
-
-/// The value at a position in a cell, given the patch's points.
-#[must_use]
-pub fn value(points: &AtPoints, (corners, weights): ([usize; 4], [f32; 4])) -> [f32; 2] {
-    let mut sum = [0.0; 2];
-    for (corner, weight) in corners.into_iter().zip(weights) {
-        add(&mut sum, weight, points[corner]);
-    }
-    sum
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// All sets of nodes that may carry a patch.
+    fn carried() -> impl Iterator<Item = u32> {
+        let corners = CORNERS.iter().fold(0, |bits, node| bits | 1 << node);
+        (0..1 << NODES).filter(move |present| present & corners == corners)
+    }
+
+    /// What `surface` is at the nodes of `present`, by their places, the cell's corners at 0 and 1; nonsense elsewhere.
+    fn sampled(present: u32, surface: impl Fn(f32, f32) -> [f32; 2]) -> AtNodes {
+        std::array::from_fn(|node| {
+            let [x, y] = PLACES[node].map(|at| at as f32 - 1.0);
+            if present >> node & 1 == 1 { surface(x, y) } else { [99.0; 2] }
+        })
+    }
+
+    /// Places all over a cell, in eighths.
+    fn places() -> impl Iterator<Item = [f32; 2]> {
+        (0..81).map(|at| [at % 9, at / 9].map(|at| at as f32 / 8.0))
+    }
+
     #[test]
-    fn points_and_their_transpose_agree() {
+    fn values_and_their_transpose_agree() {
         let mut seed = 1u32;
         let mut random = || {
             seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             (seed >> 8) as f32 / 16_777_216.0 - 0.5
         };
-        for outer in [0u32, 0xffff, 0x1234, 0x9a51, 0x0f00] {
-            let stencil = Stencil::new(outer | CORNERS.iter().fold(0, |bits, node| bits | 1 << node));
+        for present in carried() {
+            let stencil = Stencil::new(present);
             let nodes: AtNodes = std::array::from_fn(|_| [random(), random()]);
-            let points: AtPoints = std::array::from_fn(|_| [random(), random()]);
+            let values: Values = std::array::from_fn(|_| [random(), random()]);
             let dot = |a: &[[f32; 2]], b: &[[f32; 2]]| a.iter().zip(b).map(|(a, b)| a[0] * b[0] + a[1] * b[1]).sum::<f32>();
-            let (one, other) = (dot(&stencil.points(&nodes), &points), dot(&nodes, &stencil.transposed(&points)));
-            assert!((one - other).abs() < 1e-5, "{outer:x}: {one} {other}");
+            let (one, other) = (dot(&stencil.values(&nodes), &values), dot(&nodes, &stencil.transposed(&values)));
+            assert!((one - other).abs() < 1e-5, "{present:x}: {one} {other}");
         }
     }
 
     #[test]
     fn planes_stay_planes_whatever_is_carried() {
-        let nodes: AtNodes = std::array::from_fn(|node| [(node % 4) as f32, (node / 4) as f32]);
-        for outer in 0..1u32 << 16 {
-            let present = outer | CORNERS.iter().fold(0, |bits, node| bits | 1 << node);
-            let carried: AtNodes = std::array::from_fn(|node| if present >> node & 1 == 1 { nodes[node] } else { [99.0; 2] });
-            let points = Stencil::new(present).points(&carried);
-            for (point, value) in points.iter().enumerate() {
-                let exact = [1.0 + 0.5 * (point % 3) as f32, 1.0 + 0.5 * (point / 3) as f32];
-                assert_eq!(*value, exact, "{present:x}");
+        let plane = |x: f32, y: f32| [3.0 + 5.0 * x - 2.0 * y, 7.0 * y - x];
+        for present in carried() {
+            let values = Stencil::new(present).values(&sampled(present, plane));
+            for [x, y] in places() {
+                assert_eq!(value(&values, &shares([x, y])), plane(x, y), "{present:x}");
+            }
+        }
+    }
+
+    #[test]
+    fn what_bends_evenly_is_met_exactly() {
+        let bent = |x: f32, y: f32| [1.0 + 2.0 * x - y + 3.0 * x * y + 4.0 * x * x - 6.0 * y * y, x * x + x * y];
+        // With a node before or after every edge, or both.
+        let edges = [[2, 5], [6, 9], [0, 10], [1, 11]];
+        let enough = |present: &u32| edges.iter().all(|nodes| nodes.iter().any(|node| present >> node & 1 == 1));
+        for present in carried().filter(enough) {
+            let values = Stencil::new(present).values(&sampled(present, bent));
+            for [x, y] in places() {
+                assert_eq!(value(&values, &shares([x, y])), bent(x, y), "{present:x}");
+            }
+        }
+        assert_eq!(carried().filter(enough).count(), 81);
+    }
+
+    #[test]
+    fn an_edge_has_its_middle_where_four_points_say() {
+        // Both edges of a surface that is the same all the way down: 9/16 of the inner two less 1/16 of the outer ones; without one of these 6/8 of
+        // the node next to the other, 3/8 of the farther one, less 1/8 of the other; the mean without both.
+        let line = |x: f32| [7.0, -5.0, 11.0, 64.0][(x + 1.0) as usize];
+        let all = carried().last().expect("there are such");
+        let (before, after) = (1 << 2 | 1 << 6, 1 << 5 | 1 << 9);
+        for (left, middle) in [(0, -17.0 / 16.0), (before, -13.0 / 8.0), (after, -0.5), (before | after, 3.0)] {
+            let present = all & !left;
+            let values = Stencil::new(present).values(&sampled(present, |x, _| [line(x), 0.0]));
+            for y in [0.0, 0.5, 1.0] {
+                assert_eq!(value(&values, &shares([0.5, y])), [middle, 0.0], "{present:x}");
             }
         }
     }

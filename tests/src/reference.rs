@@ -208,7 +208,7 @@ impl<'a> Reference<'a> {
     pub fn candidates(&self, frame: u32, weights: Weights) -> Vec<Vec<(u8, [f64; 2])>> {
         let mut all = Vec::new();
         self.each_pixel(frame, weights, |sheets, within| {
-            all.push(sheets.iter().map(|sheet| (sheet.label, quartered(&sheet.points, within))).collect());
+            all.push(sheets.iter().map(|sheet| (sheet.label, sheet.position.map(|of| of.at(within)))).collect());
         });
         all
     }
@@ -236,27 +236,26 @@ impl<'a> Reference<'a> {
 
     /// The sheet of `label` in a cell; `None` where a corner carries no such layer.
     fn sheet(&self, moment: &Moment, [column, row]: [usize; 2], label: u8, test: u16) -> Option<Sheet> {
-        let mut sheet = Sheet { label, test, points: [[0.0; 2]; 9], motion: 0.0, fields: [[0.0; 2]; 4], shift: 0.0 };
+        let (mut motion, mut shift) = (0.0, 0.0);
         let cubic = self.bundle.path().space == SPACE_CUBIC;
-        // The nodes around the cell, four by four, counted from its upper left corner.
-        let mut node = |across: isize, down: isize| -> Option<Layer> {
-            let inside = |at: usize, step: isize, count: usize| at.checked_add_signed(step).filter(|&at| at < count);
-            let (column, row) = (inside(column, across, self.grid.columns + 1)?, inside(row, down, self.grid.rows + 1)?);
-            self.layer(moment, row * (self.grid.columns + 1) + column, label, &mut sheet.motion, &mut sheet.shift)
-        };
-        for (corner, [across, down]) in [[0, 0], [1, 0], [0, 1], [1, 1]].into_iter().enumerate() {
-            sheet.fields[corner] = node(across, down)?.fields;
+        // Four rows of four nodes, the cell's corners in the middle. Only these count where space is linear, and nothing across from them else.
+        let mut around = [[None; 4]; 4];
+        for (down, across) in (0..4).flat_map(|down| (0..4).map(move |across| (down, across))) {
+            let inner = [across, down].map(|at: usize| (1..3).contains(&at));
+            if inner == [true; 2] || (cubic && inner != [false; 2]) {
+                let node = |at: usize, along: usize, count: usize| (at + along).checked_sub(1).filter(|&at| at < count);
+                let at = node(column, across, self.grid.columns + 1).zip(node(row, down, self.grid.rows + 1));
+                around[down][across] =
+                    at.and_then(|(column, row)| self.layer(moment, row * (self.grid.columns + 1) + column, label, &mut motion, &mut shift));
+            }
         }
-        // The four columns halfway down, and the two edges: what lies halfway across each.
-        let mut nodes = |row: isize| [-1, 0, 1, 2].map(|column| Some(node(column, row).filter(|_| cubic || (0..2).contains(&column))?.at));
-        let [above, top, bottom, below] = [-1, 0, 1, 2].map(&mut nodes);
-        let outer = |row: [Option<[f64; 2]>; 4]| if cubic { row } else { [None; 4] };
-        let (above, below) = (outer(above), outer(below));
-        let halfway = [0, 1, 2, 3].map(|column: usize| middle([above[column], top[column], bottom[column], below[column]]));
-        for (place, row) in [top, halfway, bottom].into_iter().enumerate() {
-            (sheet.points[3 * place], sheet.points[3 * place + 1], sheet.points[3 * place + 2]) = (row[1]?, middle(row)?, row[2]?);
+        let position = |axis: usize| Patch::new(around.map(|row| row.map(|layer: Option<Layer>| Some(layer?.at[axis]))));
+        let mut corners = [[0.0; 2]; 4];
+        for (corner, layer) in corners.iter_mut().zip([around[1][1], around[1][2], around[2][1], around[2][2]]) {
+            *corner = layer?.fields;
         }
-        Some(sheet)
+        let field = |axis: usize| Patch::flat(corners.map(|fields| fields[axis]));
+        Some(Sheet { label, test, position: [position(0)?, position(1)?], motion, fields: [field(0), field(1)], shift })
     }
 
     /// The layer of `label` at a node at one moment; `None` where either end of the interval carries none. The farthest that its keys are
@@ -282,11 +281,11 @@ impl<'a> Reference<'a> {
         let size = self.size();
         let (mut motion, mut margin, mut outline, mut shift) = (0.0f64, f64::INFINITY, f64::INFINITY, 0.0f64);
         for (index, sheet) in sheets.iter().enumerate() {
-            let at = quartered(&sheet.points, within);
+            let at = sheet.position.map(|of| of.at(within));
             let last = index + 1 == sheets.len();
             let mut shows = true;
             if !last && sheet.test != CHART {
-                let [a, b] = bilinear(&sheet.fields, within);
+                let [a, b] = sheet.fields.map(|of| of.at(within));
                 let strip = self.bundle.label(sheet.label).flags & STRIP != 0;
                 let least = if strip { a.min(b) } else { a };
                 (outline, shift) = (outline.min(least.abs()), shift.max(sheet.shift));
@@ -352,61 +351,103 @@ struct Moment {
     linear: f64,
 }
 
-/// A sheet of a cell at one moment: three rows of three points, and the fields at the corners top left, top right, bottom left, bottom right.
+/// A sheet of a cell at one moment: u and v of its positions, texels, and its fields, pixels.
 struct Sheet {
     label: u8,
     test: u16,
-    points: [[f64; 2]; 9],
+    position: [Patch; 2],
     motion: f64,
-    fields: [[f64; 2]; 4],
+    fields: [Patch; 2],
     shift: f64,
 }
 
-/// The value halfway between the inner two of four in a row: on the cubic through all of them, the parabola through three, the line
-/// through two; `None` without the inner two.
-fn middle([before, from, to, after]: [Option<[f64; 2]>; 4]) -> Option<[f64; 2]> {
+/// One number over a cell: what it is at the corners, and constant second derivatives across and down.
+#[derive(Clone, Copy, Debug)]
+pub struct Patch {
+    /// Top left, top right, bottom left, bottom right.
+    corners: [f64; 4],
+    /// Second derivative across, cells to the square.
+    across: f64,
+    /// Second derivative down, likewise.
+    down: f64,
+}
+
+impl Patch {
+    /// Without second derivatives.
+    #[must_use]
+    pub fn flat(corners: [f64; 4]) -> Self {
+        Self { corners, across: 0.0, down: 0.0 }
+    }
+
+    /// What four rows of four nodes say of the cell in their middle, those that carry a number; `None` without one of its corners. A second derivative
+    /// is the mean of two edges'.
+    #[must_use]
+    pub fn new(nodes: [[Option<f64>; 4]; 4]) -> Option<Self> {
+        let [_, upper, lower, _] = nodes;
+        let [left, right] = [1, 2].map(|column: usize| nodes.map(|row| row[column]));
+        Some(Self {
+            corners: [upper[1]?, upper[2]?, lower[1]?, lower[2]?],
+            across: (second_derivative(upper)? + second_derivative(lower)?) / 2.0,
+            down: (second_derivative(left)? + second_derivative(right)?) / 2.0,
+        })
+    }
+
+    /// The number `x` and `y` of the way through the cell: the parabolas that the second derivatives make are nothing at the corners.
+    #[must_use]
+    pub fn at(&self, [x, y]: [f64; 2]) -> f64 {
+        let [a, b, c, d] = self.corners;
+        let (left, right) = (a + (c - a) * y, b + (d - b) * y);
+        left + (right - left) * x + self.across / 2.0 * x * (x - 1.0) + self.down / 2.0 * y * (y - 1.0)
+    }
+}
+
+/// The second derivative along the edge between the inner two of four nodes in a row: the mean of the second differences at either end, or the one
+/// there is, or none; `None` without the inner two.
+fn second_derivative([before, from, to, after]: [Option<f64>; 4]) -> Option<f64> {
     let (from, to) = (from?, to?);
-    Some([0, 1].map(|axis: usize| match (before, after) {
-        (Some(before), Some(after)) => (9.0 * (from[axis] + to[axis]) - before[axis] - after[axis]) / 16.0,
-        (Some(before), None) => (6.0 * from[axis] + 3.0 * to[axis] - before[axis]) / 8.0,
-        (None, Some(after)) => (3.0 * from[axis] + 6.0 * to[axis] - after[axis]) / 8.0,
-        (None, None) => (from[axis] + to[axis]) / 2.0,
-    }))
+    let ends = [before.map(|before| before - 2.0 * from + to), after.map(|after| from - 2.0 * to + after)];
+    Some(match ends {
+        [Some(start), Some(end)] => (start + end) / 2.0,
+        [Some(only), None] | [None, Some(only)] => only,
+        [None, None] => 0.0,
+    })
 }
 
-/// The side of the player's tiles, pixels, in cells of `cell` pixels and with this kind of space.
+/// How far the integers may be from what they mean, for their rounding in space, in a cell of `cell` pixels and with this kind of space: half units
+/// of 1 / 2^16, the positions of four corners to half a unit among them.
 #[must_use]
-pub fn tile(cell: u32, space: u8) -> u32 {
-    if space == SPACE_CUBIC { cell / 2 } else { cell }.min(8)
+pub fn rounded(cell: u32, space: u8) -> f64 {
+    let cell = f64::from(cell);
+    // The corners; the product down the cell; the step across it, at its last pixel.
+    let straight = 1.0 + 2.0 + (cell - 1.0);
+    // What the nodes around add to the corners; each second difference, which is half a unit off, over cell^2 / 8 at most; half of one down the
+    // cell and half of one in the step, where they are odd.
+    let bent = SPREAD - 1.0 + cell * cell / 4.0 + 1.0 + (cell - 1.0);
+    if space == SPACE_CUBIC { straight + bent } else { straight }
 }
 
-/// How far the player's positions may be off in tiles, texels, in a picture 2^`width_log2` texels wide: a position, its steps along
-/// both axes and how these change are each rounded to a step, and add up over a tile.
+/// How much farther off than its nodes a patch may be: the sum of the sizes of their weights, where each edge has a node on one side only.
+pub const SPREAD: f64 = 1.5;
+
+/// The side of the player's tiles, pixels, in cells of `cell` pixels.
+#[must_use]
+pub fn tile(cell: u32) -> u32 {
+    cell.min(16)
+}
+
+/// How far the player's positions may be off in tiles, texels, in a picture 2^`width_log2` texels wide. In tiles of n pixels a position, its steps
+/// along both axes and how the one changes along the other are each rounded to a unit, that is half a unit off, and add up to n^2 / 2 units; where
+/// space is cubic, how either step changes along its own axis is too, over at most n^2 / 8.
 #[must_use]
 pub fn packed(cell: u32, space: u8, width_log2: u32) -> f64 {
-    let steps = match width_log2 {
+    let units = match width_log2 {
         7..=10 => 256.0,
         // No tiles there.
         _ => f64::INFINITY,
     };
-    0.5 * f64::from(tile(cell, space)).powi(2) / steps
-}
-
-/// The value `x` and `y` of the way through a cell, which is bilinear in each quarter.
-fn quartered(points: &[[f64; 2]; 9], [x, y]: [f64; 2]) -> [f64; 2] {
-    let (right, lower) = (usize::from(x >= 0.5), usize::from(y >= 0.5));
-    let first = 3 * lower + right;
-    let quarter = [points[first], points[first + 1], points[first + 3], points[first + 4]];
-    bilinear(&quarter, [2.0 * x - right as f64, 2.0 * y - lower as f64])
-}
-
-/// The value `x` and `y` of the way through a cell, from those at its corners.
-fn bilinear([a, b, c, d]: &[[f64; 2]; 4], [x, y]: [f64; 2]) -> [f64; 2] {
-    [0, 1].map(|axis: usize| {
-        let left = a[axis] + (c[axis] - a[axis]) * y;
-        let right = b[axis] + (d[axis] - b[axis]) * y;
-        left + (right - left) * x
-    })
+    let square = f64::from(tile(cell)).powi(2);
+    let bent = if space == SPACE_CUBIC { square / 8.0 } else { 0.0 };
+    (square / 2.0 + bent) / units
 }
 
 /// The layers of every node of a key.

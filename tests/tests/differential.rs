@@ -5,11 +5,12 @@
 //! - a layer in time to nearest: 1 / 2^17;
 //! - the left and the right end of a span downwards: 1 / 2^16;
 //! - the step along it to nearest: (cell - 1) / 2^17 at its last pixel.
-//! - for a look-up, positions are packed in tiles of n by n pixels, four or eight: to the nearest of 512 steps a texel in a picture 512 texels
-//!   wide, of 256 in one half or twice as wide, and so are the step along a row, that from row to row and what that adds to the other: n^2 / 2 steps.
+//! - for a look-up, positions are packed in tiles of up to 16 by 16 pixels, to the nearest of 256 steps a texel, and so are the step along a row,
+//!   that from row to row and how each of these changes (`reference::packed`): n^2 / 2 steps in tiles of n by n, n^2 / 8 more where space is cubic.
 //!
-//! Where space is cubic, a span is half a cell long, and a value halfway between others is rounded downwards, to at most 1 / 2^16 less,
-//! and up to 5/4 as far off as these: after two such steps, down and across, 6 / 2^17 instead of the layer's 1 / 2^17.
+//! Where space is cubic, what the nodes around add to a cell makes its positions up to 3/2 as far off as its layers. Both second differences are
+//! rounded to nearest, which adds up to cell^2 / 8 times 1 / 2^17 each; what they add to an edge and to the step across is rounded downwards:
+//! 1 / 2^17 and (cell - 1) / 2^17 (`reference::rounded`).
 //!
 //! A field, in pixels, is rounded downwards to 1 / 2^8 in time.
 //!
@@ -22,18 +23,18 @@
 
 use cubist_baker::atlas::{self, Storage};
 use cubist_baker::bake::Settings;
+use cubist_baker::patch;
 use cubist_baker::scene::builtin;
 use cubist_core::fixed::{MAX_FIELD, ONE, field_distance};
 use cubist_core::format::{SPACE_CUBIC, SPACE_LINEAR, TIME_CUBIC, TIME_HOLD, TIME_LINEAR, TexelKind};
 use cubist_core::timeline;
 use cubist_core::{AnyTexels, Bundle, Direct565, Indexed4, Indexed8, Texels};
+use cubist_tests::random::Random;
 use cubist_tests::reference::{Pixel, Reference, Weights};
 use cubist_tests::{play, reference, scenes};
 
-/// Pixels whose colour may differ, percent, in tiles of at most four pixels: nearly all there are, torn blocks too.
-const DIFFERING: f64 = 0.5;
-/// The same in tiles of eight, percent.
-const DIFFERING_IN_EIGHTS: f64 = 1.2;
+/// Pixels whose colour may differ, percent, in tiles of four pixels, eight and sixteen: nearly all there are, torn blocks too.
+const DIFFERING: [f64; 3] = [0.5, 1.2, 2.4];
 /// How much more where weights are rounded and the oracle's are exact, percent.
 const DIFFERING_IN_TIME: f64 = 0.05;
 /// How far a weight of the player may be from the exact one: half a unit, and what Q28 leaves.
@@ -67,7 +68,7 @@ impl Found {
 /// The side of a bundle's tiles, pixels.
 fn tile(bytes: &[u8]) -> u32 {
     let bundle = Bundle::parse(bytes).expect("the baker's bytes parse");
-    reference::tile(1 << bundle.path().cell_log2, bundle.path().space)
+    reference::tile(1 << bundle.path().cell_log2)
 }
 
 /// The bounds of one pixel: on positions, texels, and on fields, pixels.
@@ -75,11 +76,11 @@ fn bounds(pixel: &Pixel, cell: u32, space: u8, width_log2: u32, weights: Weights
     let unit = 1.0 / f64::from(1u32 << 17);
     let packed = reference::packed(cell, space, width_log2);
     let off = if weights == Weights::Exact { WEIGHT } else { 0.0 };
-    let (rounded, spread) = if space == SPACE_CUBIC { (cell / 2 + 7, 25.0 / 16.0) } else { (cell + 2, 1.0) };
+    let spread = if space == SPACE_CUBIC { reference::SPREAD } else { 1.0 };
     // The slack is what f64 itself rounds.
     [
-        packed + f64::from(rounded) * unit + spread * 3.0 * off * pixel.motion + 1e-9,
-        1.0 / 256.0 + f64::from(cell + 2) * unit + off * pixel.shift + 1e-9,
+        packed + reference::rounded(cell, space) * unit + spread * 3.0 * off * pixel.motion + 1e-9,
+        1.0 / 256.0 + reference::rounded(cell, SPACE_LINEAR) * unit + off * pixel.shift + 1e-9,
     ]
 }
 
@@ -134,7 +135,7 @@ fn check(name: &str, bytes: &[u8], frames: impl IntoIterator<Item = u32> + Clone
 /// Like [`check`], by a player of texels that `T` names.
 fn check_as<T: Texels>(name: &str, bytes: &[u8], frames: impl IntoIterator<Item = u32> + Clone) -> Found {
     let round = round_intervals(bytes);
-    let most = if tile(bytes) == 8 { DIFFERING_IN_EIGHTS } else { DIFFERING };
+    let most = DIFFERING[tile(bytes).ilog2() as usize - 2];
     let kinds = [("exact", Weights::Exact, if round { most } else { most + DIFFERING_IN_TIME }), ("the player's", Weights::Player, most)];
     let found = kinds.iter().take(if round { 1 } else { 2 }).map(|&(kind, weights, most)| {
         let found = compare::<T>(bytes, frames.clone(), weights, round);
@@ -210,6 +211,26 @@ fn field_codes_are_four_to_an_octave() {
         let found = f64::from(field_distance(code)) / 256.0;
         assert!((found / exact - 1.0).abs() < 0.01, "code {code}: {found} for {exact}");
         assert_eq!(field_distance(-code), -field_distance(code));
+    }
+}
+
+#[test]
+fn the_baker_bends_cells_as_the_reference_does() {
+    // The nodes that a patch looks at, in the order of the baker's, of four rows of four.
+    let places: Vec<[usize; 2]> = (0..16).map(|at| [at % 4, at / 4]).filter(|at| at.iter().any(|at| (1..3).contains(at))).collect();
+    assert_eq!(patch::CORNERS.map(|node| places[node]), [[1, 1], [2, 1], [1, 2], [2, 2]]);
+    let mut random = Random(11);
+    for present in (0..1 << patch::NODES).filter(|present| patch::CORNERS.iter().all(|node| present >> node & 1 == 1)) {
+        let of_baker = [0; patch::NODES].map(|_| [random.below(1000) as f32 / 1000.0, 0.0]);
+        let mut nodes = [[None; 4]; 4];
+        for (node, &[column, row]) in places.iter().enumerate().filter(|(node, _)| present >> node & 1 == 1) {
+            nodes[row][column] = Some(f64::from(of_baker[node][0]));
+        }
+        let (values, exact) = (patch::Stencil::new(present).values(&of_baker), reference::Patch::new(nodes).expect("its corners"));
+        for at in (0..64).map(|at| [at % 8, at / 8].map(|at| at as f32 / 8.0)) {
+            let (found, exact) = (f64::from(patch::value(&values, &patch::shares(at))[0]), exact.at(at.map(f64::from)));
+            assert!((found - exact).abs() < 1e-6, "{present:x}, {at:?}: {found}, {exact}");
+        }
     }
 }
 

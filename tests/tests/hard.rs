@@ -10,7 +10,7 @@
 use cubist_baker::gbuffer::Lens;
 use cubist_baker::trace::Tracer;
 use cubist_core::Bundle;
-use cubist_core::format::SPACE_CUBIC;
+use cubist_core::format::SPACE_LINEAR;
 use cubist_tests::hard::exact::{self, Meeting};
 use cubist_tests::hard::{self, Baked, CASES, Figures, baseline, rays};
 use cubist_tests::play;
@@ -40,11 +40,10 @@ fn integers_are_exact(bytes: &[u8]) {
     let bundle = Bundle::parse(bytes).expect("the baker's bytes parse");
     let reference = Reference::new(&bundle);
     let frames = bundle.frames();
-    let cell = f64::from(1u32 << bundle.path().cell_log2);
-    let steps = if bundle.path().space == SPACE_CUBIC { cell / 2.0 + 7.0 } else { cell + 2.0 };
-    let unit = 1.0 / f64::from(1u32 << 17);
-    let packed = reference::packed(1 << bundle.path().cell_log2, bundle.path().space, u32::from(bundle.atlas().width_log2));
-    let (bound, outline) = (packed + steps * unit + 1e-9, 1.0 / 256.0 + (cell + 2.0) * unit + 1e-9);
+    let (cell, space) = (1 << bundle.path().cell_log2, bundle.path().space);
+    let rounded = |space| reference::rounded(cell, space) / f64::from(1u32 << 17) + 1e-9;
+    let packed = reference::packed(cell, space, u32::from(bundle.atlas().width_log2));
+    let (bound, outline) = (packed + rounded(space), 1.0 / 256.0 + rounded(SPACE_LINEAR));
     let (mut pixels, mut differ) = (0, 0);
     play::visit(bytes, [0, 3, frames / 2, frames - 2], |frame, player| {
         let (colours, probes) = (play::pixels(player), play::probes(player));

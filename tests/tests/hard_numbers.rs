@@ -1,17 +1,17 @@
 //! Fixed point at its edges: the largest source image, positions at both ends of it, moments at both ends of an interval, weights that
 //! add up, sums that stay in range, and a million seeks. Each bound is stated where it is used.
 
-use cubist_core::fixed::{KEY_MAX, KEY_MIN, KeyUv, ONE, WEIGHT_BITS, middle};
-use cubist_core::format::{ATLAS, Limits, PATH, Path, TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
+use cubist_core::fixed::{KEY_MAX, KEY_MIN, KeyUv, ONE, WEIGHT_BITS};
+use cubist_core::format::{ATLAS, Limits, PATH, Path, SPACE_CUBIC, TIME_CUBIC, TIME_HOLD, TIME_LINEAR};
 use cubist_core::{Bundle, Frame, Player, Probe, timeline};
 use cubist_tests::random::Random;
-use cubist_tests::reference::{Reference, Weights, packed};
+use cubist_tests::reference::{Patch, Reference, SPREAD, Weights, packed, rounded};
 use cubist_tests::synthetic::Synthetic;
 use cubist_tests::{play, tamper};
 use rayon::prelude::*;
 
-/// Half a step of the positions that four pixels in a row are packed to, and as much again for the step along them, texels.
-const PACKED: f64 = 2.0 / 256.0;
+/// Half a step of the positions that eight pixels in a row are packed to, and as much again for each step along them, texels.
+const PACKED: f64 = 4.0 / 256.0;
 
 /// The step of stored positions, texels.
 fn stored(bytes: &[u8]) -> f64 {
@@ -61,7 +61,7 @@ fn both_ends_of_an_interval_are_exactly_the_keys() {
             [x as f32 + 20.5 + shift, y as f32 + 30.5]
         };
         let bytes = scene.bundle(place).expect("it fits");
-        let bound = PACKED + 0.5 * stored(&bytes);
+        let bound = PACKED + SPREAD * 0.5 * stored(&bytes);
         // Held, a key shows from its frame up to the next one's, and the last interval of a path that ends its last frame as well (FORMAT.md,
         // Time): its two frames share what is between them, so that neither is exact. All before are.
         let frames = if time == TIME_HOLD { scene.frames - 2 } else { scene.frames };
@@ -146,18 +146,90 @@ fn positions_saturate_and_never_wrap() {
         assert_eq!((KeyUv::new(far, 7).u(), KeyUv::new(far, 7).v()), (edge, 7));
         assert_eq!((KeyUv::new(7, far).u(), KeyUv::new(7, far).v()), (7, edge));
     }
-    // Keys as far apart as they can be overshoot by less than a quarter of that, and what lies halfway of such by as much again: both are
-    // told apart from wrapping by what f64 says.
+    // Keys as far apart as they can be overshoot by less than a quarter of that, and nodes that do so in turn bend the cells between them by as much
+    // again: both are told apart from wrapping by what f64 says.
     let play = |x: f64| (x * 2048.0) as i32;
     let (low, high) = (f64::from(KEY_MIN), f64::from(KEY_MAX));
     for keys in [[low, high, high, low], [high, low, low, high], [low, low, high, high], [high, high, low, high]] {
         for passed in 0..=16 {
             let time = between(TIME_CUBIC, [16; 3], passed, keys.map(|key| key as i64));
             assert!((low - 16_384.0..=high + 16_384.0).contains(&time), "{keys:?}, {passed}: {time}");
-            let (a, b) = (play(time), play(low + high - time));
-            let found = f64::from(middle(Some(b), a, b, Some(b)));
-            let exact = (f64::from(a) + f64::from(b) + (f64::from(a) - f64::from(b)) / 8.0) / 2.0;
-            assert!((found - exact).abs() <= 2.0, "{keys:?}, {passed}: {found}, exactly {exact}");
+            let ends = [play(time), play(low + high - time)];
+            for (log2, turns) in [(2, 1), (3, 0b01_1110), (4, 0b1_0110), (5, 0b11_0001)] {
+                // Nodes are at one end or the other: like a chessboard, in rows, in columns, and otherwise.
+                let nodes = [0, 1, 2, 3].map(|y: usize| [0, 1, 2, 3].map(|x: usize| Some(ends[(turns >> (x + 2 * y) ^ x ^ y) & 1])));
+                let off = patch_off(log2, nodes);
+                assert!(off <= 0.5 * (rounded(1 << log2, SPACE_CUBIC) - SPREAD), "{keys:?}, {passed}, {log2}: {off} units off");
+            }
+        }
+    }
+}
+
+/// A patch in integers, word for word as FORMAT.md has it, at the pixel `x` columns and `y` rows into a cell of 2^`log2` pixels. Whatever has to fit
+/// 32 bits does.
+fn patch_in_integers(log2: u32, nodes: [[Option<i32>; 4]; 4], [x, y]: [i64; 2]) -> i64 {
+    let fits = |value: i64| i64::from(i32::try_from(value).expect("it fits 32 bits"));
+    let at = |line: [Option<i32>; 4], node: usize| i64::from(line[node].expect("a corner"));
+    // What an edge takes: two second differences.
+    let edge = |line: [Option<i32>; 4]| {
+        let second = |node: usize| {
+            let [before, here, after] = [node - 1, node, node + 1].map(|node| line[node].map(i64::from));
+            Some(fits(before? - 2 * here? + after?))
+        };
+        let ends = [second(1), second(2)];
+        ends[0].or(ends[1]).unwrap_or(0) + ends[1].or(ends[0]).unwrap_or(0)
+    };
+    let column = |column: usize| nodes.map(|row| row[column]);
+    let mean = |sum: i64| fits(fits(sum) + (1 << (2 * log2 + 1))) >> (2 * log2 + 2);
+    let (e, f) = (mean(edge(nodes[1]) + edge(nodes[2])), mean(edge(column(1)) + edge(column(2))));
+    let n = 1 << log2;
+    let side = |line: [Option<i32>; 4]| {
+        let (from, to) = (at(line, 1), at(line, 2));
+        fits(from + ((fits(to - from) * y) >> log2) + (fits(f * y * (y - n)) >> 1))
+    };
+    let (left, right) = (side(column(1)), side(column(2)));
+    let step = fits(fits(fits(right - left) + (n >> 1)) >> log2) - (fits(e * (n - 1)) >> 1);
+    fits(left + fits(x * step) + fits(e * (x * (x - 1) / 2)))
+}
+
+/// The farthest that such a patch is off anywhere in its cell, units.
+fn patch_off(log2: u32, nodes: [[Option<i32>; 4]; 4]) -> f64 {
+    let exact = Patch::new(nodes.map(|row| row.map(|node| node.map(f64::from)))).expect("it has its corners");
+    let pixels = (0..1i64 << log2).flat_map(|y| (0..1i64 << log2).map(move |x| [x, y]));
+    let off = |at: [i64; 2]| (patch_in_integers(log2, nodes, at) as f64 - exact.at(at.map(|at| at as f64 / f64::from(1u32 << log2)))).abs();
+    pixels.map(off).fold(0.0, f64::max)
+}
+
+#[test]
+fn patches_in_integers_are_where_f64_says() {
+    let mut random = Random(7);
+    for log2 in 2..=5 {
+        let (bound, mut most) = (0.5 * (rounded(1 << log2, SPACE_CUBIC) - SPREAD), 0.0f64);
+        for _ in 0..2_000 {
+            let range = 1 + random.below(1 << 26);
+            let nodes = [0, 1, 2, 3].map(|y| {
+                [0, 1, 2, 3].map(|x| {
+                    let corner = (1..3).contains(&x) && (1..3).contains(&y);
+                    (corner || random.below(3) > 0).then_some(random.below(range) as i32 - range as i32 / 3)
+                })
+            });
+            most = most.max(patch_off(log2, nodes));
+        }
+        println!("cells of {}: {most:.2} units off, bound {bound:.2}", 1 << log2);
+        assert!(most <= bound && most > 0.5 * bound, "cells of {}: {most} units off, bound {bound}", 1 << log2);
+        // A plane of whole steps a pixel is met exactly, whatever is carried, and so is what bends by whole units.
+        let n = 1 << log2;
+        for missing in 0..1 << 16 {
+            let missing = missing & !0x660;
+            let nodes = [0, 1, 2, 3]
+                .map(|y: i32| [0, 1, 2, 3].map(|x: i32| (missing >> (4 * y + x) & 1 == 0).then_some(n * (37 * x - 11 * y) + 9)));
+            let at = [1, n - 1].map(i64::from);
+            assert_eq!(patch_in_integers(log2, nodes, at), (26 * i64::from(n) + 9) + 37 - 11 * (i64::from(n) - 1), "{missing:x}");
+        }
+        let bent = |x: i32, y: i32| x * x - 5 * x + 3 * y * y + 7 * y;
+        let nodes = [0, 1, 2, 3].map(|y: i32| [0, 1, 2, 3].map(|x: i32| Some(bent((x - 1) * n, (y - 1) * n))));
+        for (x, y) in (0..n).flat_map(|y| (0..n).map(move |x| (x, y))) {
+            assert_eq!(patch_in_integers(log2, nodes, [x, y].map(i64::from)), i64::from(bent(x, y)), "({x}, {y})");
         }
     }
 }
