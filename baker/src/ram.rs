@@ -1,7 +1,7 @@
 //! Memory: the best bundle whose player gets by with a number of bytes.
 //! Rays and options come from `tune`; the choice goes back there, with a word on what it gave up.
 //!
-//! A player holds five keys where time is cubic and three where it is straight, five rows of nodes where space is cubic and two where it is
+//! A player holds five keys where time is cubic and three where it is straight, three rows of nodes where space is cubic, which bend, and two where it is
 //! straight, and fewer layers in either where cells are larger. What each of these loses differs from scene to scene: it is measured.
 
 use crate::bake::{BakeError, Encoded, Flat, Settings};

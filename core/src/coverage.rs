@@ -4,8 +4,8 @@
 
 use crate::atlas::Texture;
 use crate::fixed::{PLAY_BITS, PlayUv};
+use crate::form::Form;
 use crate::format::{LabelRecord, MASKED, STRIP};
-use crate::patch::Form;
 
 /// How much of something a sheet covers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

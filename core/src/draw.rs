@@ -3,10 +3,10 @@
 
 use crate::Bundle;
 use crate::fixed::PlayUv;
+use crate::form::Form;
 use crate::key::{self, BACKDROP};
 use crate::lists::{CHART, FIELD};
 use crate::memory::Workspace;
-use crate::patch::Form;
 use crate::plan::{PLAIN, Plan, Run};
 use crate::site::{BLOCK_LOG2, Site};
 use crate::span::{self, Packed, Span};

@@ -221,7 +221,7 @@ pub const TIME_CUBIC: u8 = 2;
 
 /// How layers are interpolated between nodes: [`Path::space`].
 pub const SPACE_LINEAR: u8 = 0;
-/// Every cell is halved both ways, its middles told from four nodes in a row; straight lines between them.
+/// Positions bend between a cell's corners, by as much as the nodes around say; fields are bilinear.
 pub const SPACE_CUBIC: u8 = 1;
 
 /// How many keys before an interval's first and after its first one are needed to play it.

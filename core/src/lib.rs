@@ -43,10 +43,10 @@
 //! 1. **Time** ([`timeline`]). Every layer of the rows of nodes around a row of cells is interpolated between the
 //!    interval's two keys: held, straight, or along a Catmull-Rom curve that takes the key before and the one after into account
 //!    where these carry the layer too.
-//! 2. **Space.** Where space is *linear*, each sheet's position is bilinear between its cell's four corners. Where it is *cubic*, the
-//!    middles of the cell's edges and its own are told first, each from four nodes in a row as far as these carry the layer
-//!    ([`fixed::middle`]), and positions are bilinear in each quarter: nearly as good as cells half as large, at no bytes. Along a row of
-//!    pixels either is one addition a pixel.
+//! 2. **Space.** Where space is *linear*, each sheet's position is bilinear between its cell's four corners. Where it is *cubic*, it bends
+//!    between them besides, evenly across and evenly down: by the mean second differences of positions at the corners, told from the nodes
+//!    around as far as these carry the layer (the four-point rule: Dyn, Levin, Gregory 1987). Nearly as good as cells half as large, at no bytes. Along a
+//!    row of pixels either is two additions a pixel.
 //! 3. **Coverage.** In a torn cell the frontmost sheet that covers a pixel shows; the last covers whatever is left. A sheet covers
 //!    a pixel by one of three tests, which its list names. The *chart* test: its position lies inside its label's rectangle, and in
 //!    the mask if the chart does not fill that. The *field* test, for outlines that no chart has, such as a cone's silhouette: a
@@ -99,6 +99,7 @@ mod error;
 mod field;
 mod filter;
 pub mod fixed;
+mod form;
 pub mod format;
 mod graphics;
 pub mod grid;

@@ -12,7 +12,7 @@ use crate::nodes::{self, Layout};
 use crate::pack::{self, Picture, Recent, Scratch};
 use crate::plan::{Plan, Run};
 use crate::record::Stream;
-use crate::row::{Node, NodeRow};
+use crate::row::{Layer, Node, NodeRow};
 use crate::sheet::{Found, RowSheets, Sheet, Stretch};
 use crate::site::BLOCK_LOG2;
 use crate::torn::{Mixed, Side};
@@ -142,17 +142,19 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, space: &mut Workspace<'
         // A row at one moment has its chains cut where either end of the interval ends one.
         row.chain = cutter.take::<Chain>(row_chains.saturating_mul(2).min(row_layers));
         row.head = cutter.take(bundle.label_count());
-        row.node = cutter.take::<Node>(row_layers);
+        row.node = cutter.take::<Node>(if cubic { row_layers } else { 0 });
+        row.layer = cutter.take::<Layer>(if cubic { 0 } else { row_layers });
         row.field = cutter.take::<[i16; 2]>(if fields > 0 { row_layers } else { 0 });
-        (row.bends, row.still) = (cubic, still);
+        row.still = still;
     }
     let sheets = &mut space.sheets;
     (sheets.stretch, sheets.sheet) = (cutter.take::<Stretch>(grid.columns), cutter.take::<Sheet>(limits.row_sheets.into()));
     sheets.found = cutter.take::<Found>(bundle.label_count());
     let plan = &mut space.plan;
     let places = grid.columns.saturating_mul(blocks);
-    (plan.tile, plan.run, plan.mixed) = (cutter.take::<Tile>(places), cutter.take::<Run>(places), cutter.take::<Mixed>(places));
-    // Most sheets of larger cells show in one of two blocks, or in few; what there is no room for is drawn pixel by pixel.
+    (plan.tile, plan.mixed) = (cutter.take::<Tile>(places), cutter.take::<Mixed>(places));
+    // Of larger cells' blocks fewer begin a run, and in fewer a sheet shows: what there is no room for is drawn pixel by pixel.
+    plan.run = cutter.take::<Run>(grid.columns);
     plan.side = cutter.take::<Side>(usize::from(limits.row_sheets) / blocks);
 }
 

@@ -35,8 +35,8 @@ pub struct Mark {
     /// The chain, counted as they begin.
     chain: u16,
     nodes: u16,
-    /// For [`Trace::marked`].
-    marks: u16,
+    /// Some cell tests their fields: 1.
+    tested: u16,
 }
 
 /// Codes the layers of one `row` of a key's nodes into `target`, which holds those of the rows above, in `contexts` ([`CONTEXTS`] of
@@ -128,7 +128,7 @@ fn lay_out<L: Fn(u8) -> LabelRecord>(setting: &Setting<'_, '_, L>, target: &mut 
         let Some(place) = layout.order.get_mut(usize::from(mark.chain)) else { break };
         let end = place.wrapping_add(mark.nodes);
         for trace in traces.get_mut(usize::from(*place)..usize::from(end)).unwrap_or(&mut []) {
-            *trace = Trace::marked(mark.marks);
+            *trace = Trace::of(mark.tested != 0);
         }
         *place = end;
     }
@@ -178,8 +178,8 @@ impl Finding<'_> {
         let mut open: Vec<u16, MAX_NODE_LAYERS> = Vec::new();
         let mut column = 0usize;
         while column < grid.node_columns() {
-            if let Some((label, support, alike)) = around.alike(grid.columns.saturating_sub(column)) {
-                let found = Found { label, support, tested: false };
+            if let Some((label, alike)) = around.alike(grid.columns.saturating_sub(column)) {
+                let found = Found { label, tested: false };
                 let chain = self.put(&open, found, column as u16, alike);
                 open.clear();
                 if let Some(chain) = chain {
@@ -219,7 +219,7 @@ impl Finding<'_> {
         if found.tested {
             chain.field = 0;
         }
-        *mark = Mark { chain: index, nodes, marks: Trace::said(found.support, found.tested) };
+        *mark = Mark { chain: index, nodes, tested: found.tested.into() };
         (self.marked, self.room) = (self.marked.wrapping_add(1), left);
         Some(index)
     }
@@ -229,8 +229,6 @@ impl Finding<'_> {
 #[derive(Clone, Copy)]
 struct Found {
     label: u8,
-    /// How many of the cells show it.
-    support: u8,
     /// Some cell tests its fields.
     tested: bool,
 }
@@ -263,11 +261,11 @@ impl<'l, 'm> Corner<'l, 'm> {
         }
     }
 
-    /// The one label that all cells around each of the next nodes show, how many cells these are, and how many nodes, `most` at most; moves past
-    /// them. `None` where the next one has others.
-    fn alike(&mut self, most: usize) -> Option<(u8, u8, u16)> {
+    /// The one label that all cells around each of the next nodes show, and how many nodes these are, `most` at most; moves past them. `None` where the
+    /// next one has others.
+    fn alike(&mut self, most: usize) -> Option<(u8, u16)> {
         let &[label] = self.left.iter().find_map(|left| left.labels.first_chunk())?;
-        let (mut alike, mut rows) = (most, 0u8);
+        let (mut alike, mut any) = (most, false);
         for (left, right) in self.left.iter().zip(&self.right) {
             let Some((list, cursor)) = right.filter(|(list, cursor)| !list.sheets(*cursor).labels.is_empty()) else {
                 // Beyond the grid's edge, as to the left of it.
@@ -280,15 +278,15 @@ impl<'l, 'm> Corner<'l, 'm> {
                 return None;
             }
             (alike, _) = list.alike(cursor, label, alike);
-            rows = rows.wrapping_add(1);
+            any = true;
         }
-        if alike == 0 || rows == 0 {
+        if alike == 0 || !any {
             return None;
         }
         for right in self.right.iter_mut().flatten() {
             (_, right.1) = right.0.alike(right.1, label, alike);
         }
-        Some((label, rows.wrapping_mul(2), alike as u16))
+        Some((label, alike as u16))
     }
 }
 
@@ -300,15 +298,12 @@ fn collect(sheets: SheetsRef<'_>, found: &mut Vec<Found, MAX_NODE_LAYERS>) {
         let at = found.iter().take_while(|other| other.label < label).count();
         let full = found.is_full();
         match found.get_mut(at) {
-            Some(other) if other.label == label => {
-                other.support = other.support.saturating_add(1);
-                other.tested |= tested;
-            }
+            Some(other) if other.label == label => other.tested |= tested,
             // Labels past the bound of a node are left out; its cells do without them.
             _ if full => {}
             _ => {
                 // Each makes room for the one before it.
-                let mut moved = Found { label, support: 1, tested };
+                let mut moved = Found { label, tested };
                 for slot in found.iter_mut().skip(at) {
                     core::mem::swap(slot, &mut moved);
                 }

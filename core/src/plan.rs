@@ -7,7 +7,7 @@
 
 use crate::key::BACKDROP;
 use crate::patch::Patch;
-use crate::row::{Layer, Node};
+use crate::row::{Layer, Place};
 use crate::sheet::{Sheet, Stretch};
 use crate::site::Site;
 use crate::torn::{self, Mixed, Side};
@@ -162,14 +162,19 @@ impl Plan<'_> {
     /// Appends smooth cells of `sheet`, from the `along`-th of its stretch on, to a run, `most` at most; returns how many.
     fn extend(&mut self, across: &Across<'_, '_, '_>, sheet: &Sheet, along: u16, most: usize) -> u16 {
         let Some(room) = &across.room else { return 0 };
-        let ([top, bottom], [above, below]) = (across.site.rows, sheet.further(along).nodes());
-        let lines = [top.from(above), bottom.from(below)];
+        let ([top, bottom], [above, below]) = (across.site.rows, sheet.further(along).nodes().map(usize::from));
         let low = across.offset()[1] > 0;
-        let grow = |plan: &mut Self| match (room.window, across.site.log2()) {
-            (Window::USUAL, 3) => plan.grow::<9, 1>(most, room.margin, low, lines),
-            (Window::NARROW, 3) => plan.grow::<8, 1>(most, room.margin, low, lines),
-            (Window::USUAL, 4) => plan.grow::<9, 2>(most, room.margin, low, lines),
-            (Window::NARROW, 4) => plan.grow::<8, 2>(most, room.margin, low, lines),
+        let bends = [top.node.get(above..).unwrap_or(&[]), bottom.node.get(below..).unwrap_or(&[])];
+        let flat = [top.layer.get(above..).unwrap_or(&[]), bottom.layer.get(below..).unwrap_or(&[])];
+        let grow = |plan: &mut Self| match (room.window, across.site.log2(), top.node.is_empty()) {
+            (Window::USUAL, 3, false) => plan.grow::<9, 1, _>(most, room.margin, low, bends),
+            (Window::NARROW, 3, false) => plan.grow::<8, 1, _>(most, room.margin, low, bends),
+            (Window::USUAL, 4, false) => plan.grow::<9, 2, _>(most, room.margin, low, bends),
+            (Window::NARROW, 4, false) => plan.grow::<8, 2, _>(most, room.margin, low, bends),
+            (Window::USUAL, 3, true) => plan.grow::<9, 1, _>(most, room.margin, low, flat),
+            (Window::NARROW, 3, true) => plan.grow::<8, 1, _>(most, room.margin, low, flat),
+            (Window::USUAL, 4, true) => plan.grow::<9, 2, _>(most, room.margin, low, flat),
+            (Window::NARROW, 4, true) => plan.grow::<8, 2, _>(most, room.margin, low, flat),
             _ => 0,
         };
         let mut more = if self.follows(sheet.label(), across.block) { grow(self) } else { 0 };
@@ -182,15 +187,15 @@ impl Plan<'_> {
     /// Appends cells of so many `TILES` a row of blocks to the last run, which they follow, as long as they fit into its window, `most` at most; returns
     /// how many. The `lines` above and below start at their left corners; `low`: of cells of two rows of blocks it is the lower one.
     #[inline(never)]
-    fn grow<const WIDTH: u32, const TILES: usize>(&mut self, most: usize, margin: i32, low: bool, lines: [&[Node]; 2]) -> u16 {
+    fn grow<const WIDTH: u32, const TILES: usize, T: Place>(&mut self, most: usize, margin: i32, low: bool, lines: [&[T]; 2]) -> u16 {
         let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return 0 };
         let Some(slots) = self.tile.get_mut(self.tiles..).map(|slots| slots.as_chunks_mut::<TILES>().0) else { return 0 };
         let Some(slots) = slots.get_mut(..most) else { return 0 };
         let window = Window { width_log2: WIDTH, ..Window::USUAL };
         let margin = margin.wrapping_add(BULGE);
         // An axis after the other: what is known of both at a time would not fit a small processor's registers.
-        let done = lay::<true, TILES>(slots, lines, i32::from(run.row).wrapping_shl(16), margin, low, window);
-        let done = lay::<false, TILES>(slots.get_mut(..done).unwrap_or(&mut []), lines, 0, margin, low, window);
+        let done = lay::<true, TILES, T>(slots, lines, i32::from(run.row).wrapping_shl(16), margin, low, window);
+        let done = lay::<false, TILES, T>(slots.get_mut(..done).unwrap_or(&mut []), lines, 0, margin, low, window);
         let tiles = done.wrapping_mul(TILES);
         run.count = run.count.wrapping_add(tiles as u16);
         self.tiles = self.tiles.wrapping_add(tiles);
@@ -253,9 +258,9 @@ impl Plan<'_> {
 /// Fills `slots` with v (`DOWN`), or adds u, of the tiles of cells between nodes above and below, as long as these lie a `margin` inside the window,
 /// which begins at `first`; returns how many do. Of cells of two tiles a row, `low` says which row it is.
 #[inline(always)]
-fn lay<const DOWN: bool, const TILES: usize>(
+fn lay<const DOWN: bool, const TILES: usize, T: Place>(
     slots: &mut [[Tile; TILES]],
-    [above, below]: [&[Node]; 2],
+    [above, below]: [&[T]; 2],
     first: i32,
     margin: i32,
     low: bool,
@@ -267,9 +272,11 @@ fn lay<const DOWN: bool, const TILES: usize>(
     let room = 1u32.wrapping_shl(log2.wrapping_add(16)).wrapping_sub((margin as u32).wrapping_mul(2));
     let corner = first.wrapping_add(margin);
     let mut edges = above.iter().zip(below);
-    let at = |node: &Node| one(node.layer).wrapping_sub(corner);
-    let sums =
-        |above: &Node, below: &Node| [one(above.across).wrapping_add(one(below.across)), one(above.down).wrapping_add(one(below.down))];
+    let at = |node: &T| one(node.layer()).wrapping_sub(corner);
+    let sums = |above: &T, below: &T| {
+        let ([a, b], [c, d]) = (above.bends().map(one), below.bends().map(one));
+        [a.wrapping_add(c), b.wrapping_add(d)]
+    };
     let Some((above, below)) = edges.next() else { return 0 };
     let ([mut a, mut c], mut left) = ([at(above), at(below)], sums(above, below));
     let mut done = 0usize;

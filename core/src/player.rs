@@ -125,9 +125,9 @@ impl<'a, T: Texels> Player<'a, T> {
     ///
     /// For each pixel at most one texel read for every sheet of its cell, and a coverage test for every one but the last: with
     /// [`Limits::row_sheets`] sheets in a row of cells, at most that times the cell's width of either. The first row of a row of blocks, which are
-    /// cells or, where space is cubic, halves of such, makes the tests of all its rows. The first row of a row of
-    /// cells also interpolates the layers of two rows of nodes (where space is cubic of four, and works out what lies halfway between the
-    /// inner two), or of one where the row of cells above was the last drawn: at most [`Limits::row_layers`] each. Never allocates, never waits.
+    /// cells, or parts of eight pixels of larger ones, makes the tests of all its rows. The first row of a row of
+    /// cells also interpolates the layers of two rows of nodes (where space is cubic of four, and works out how they bend), or of one where the row
+    /// of cells above was the last drawn: at most [`Limits::row_layers`] each. Never allocates, never waits.
     #[inline]
     pub fn row(&mut self, y: u32, out: &mut [u16]) {
         T::row(&mut self.playing, y, out);

@@ -15,10 +15,8 @@ use crate::plane::Across;
 const PREDICTORS: usize = 6;
 /// Classes of how wrong the predictions were around a layer.
 const NOISE_CLASSES: usize = 9;
-/// Classes of how many of the eight cells around a node show the layer's label.
-const SUPPORT_CLASSES: usize = 2;
 /// Contexts positions are coded with.
-pub const CONTEXTS: usize = SUPPORT_CLASSES * NOISE_CLASSES * 2 * NUMBER_CONTEXTS;
+pub const CONTEXTS: usize = NOISE_CLASSES * 2 * NUMBER_CONTEXTS;
 /// How far off a predictor counts that had nothing to say, steps.
 const SILENT: u32 = 40;
 
@@ -59,8 +57,7 @@ pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
         };
         let predicted = predicted.map(round);
         let marks = trace.marks();
-        let class = usize::from(marks & SUPPORTED == 0).wrapping_mul(NOISE_CLASSES).wrapping_add(sums.noise_class());
-        let at = class.wrapping_mul(2 * NUMBER_CONTEXTS);
+        let at = sums.noise_class().wrapping_mul(2 * NUMBER_CONTEXTS);
         let Some((along_u, rest)) = contexts.get_mut(at..).and_then(|c| c.split_at_mut_checked(NUMBER_CONTEXTS)) else { break };
         let Some((along_v, _)) = rest.split_at_mut_checked(NUMBER_CONTEXTS) else { break };
         let [u, v] = source.residual(node, label, predicted, [along_u, along_v]);
@@ -102,18 +99,11 @@ const TEMPORAL: u32 = 1 << 8;
 const FLAT: u32 = 1 << 11;
 /// [`Trace::marks`]: the layer is coded.
 const THERE: u32 = 1 << 14;
-/// [`Trace::marks`]: most cells around the node show the label. Until it is coded.
-const SUPPORTED: u32 = 1 << 15;
 
 impl Trace {
-    /// What sheet lists say of a layer: `support` cells around its node show its label, and some cell `tested` its fields.
-    pub(crate) const fn said(support: u8, tested: bool) -> u16 {
-        ((if support >= 5 { SUPPORTED } else { 0 }) | if tested { TESTED } else { 0 }) as u16
-    }
-
-    /// The trace of a layer that is not coded yet.
-    pub(crate) fn marked(marks: u16) -> Self {
-        Self { bytes: [0, u32::from(marks) << MARKS], ..Self::default() }
+    /// The trace of a layer that is not coded yet; some cell `tested` its fields.
+    pub(crate) fn of(tested: bool) -> Self {
+        Self { bytes: [0, if tested { TESTED << MARKS } else { 0 }], ..Self::default() }
     }
 
     /// Some cell tests the layer's fields.

@@ -34,7 +34,7 @@ impl Layer {
 }
 
 /// A layer at its node and how it bends there, in caller's memory. Second differences of positions, Q15.16 texels: where it has no neighbour on one
-/// side, those of the one on the other; none where space is linear.
+/// side, those of the one on the other.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Node {
@@ -46,8 +46,50 @@ pub struct Node {
     pub down: Layer,
 }
 
-impl Node {
-    const NOWHERE: Self = Self { layer: Layer::ZERO, across: Layer::ZERO, down: Layer::ZERO };
+/// What a row holds of a layer: where it is, and, if space is cubic, how it bends.
+pub trait Place: Copy {
+    /// Where it is.
+    fn layer(&self) -> Layer;
+
+    /// Its second differences, across and down.
+    fn bends(&self) -> [Layer; 2];
+
+    /// A layer that bends nowhere.
+    fn flat(layer: Layer) -> Self;
+}
+
+impl Place for Layer {
+    #[inline(always)]
+    fn layer(&self) -> Layer {
+        *self
+    }
+
+    #[inline(always)]
+    fn bends(&self) -> [Layer; 2] {
+        [Self::ZERO; 2]
+    }
+
+    #[inline(always)]
+    fn flat(layer: Layer) -> Self {
+        layer
+    }
+}
+
+impl Place for Node {
+    #[inline(always)]
+    fn layer(&self) -> Layer {
+        self.layer
+    }
+
+    #[inline(always)]
+    fn bends(&self) -> [Layer; 2] {
+        [self.across, self.down]
+    }
+
+    #[inline(always)]
+    fn flat(layer: Layer) -> Self {
+        Self { layer, across: Layer::ZERO, down: Layer::ZERO }
+    }
 }
 
 /// [`Node::down`] where there is no row above: the next row tells.
@@ -97,10 +139,10 @@ fn straight<'s>(slots: impl Iterator<Item = &'s mut i16>, from: &[i8], to: &[i8]
 
 /// Fills `slots` with what `four` keys' positions make with these `weights`.
 #[inline(never)]
-fn blend_all(slots: &mut [Node], [a, b, c, d]: [&[u32]; 4], weights: Weights, key_bits: u32) {
+fn blend_all<T: Place>(slots: &mut [T], [a, b, c, d]: [&[u32]; 4], weights: Weights, key_bits: u32) {
     let keys = a.iter().zip(b).zip(c.iter().zip(d));
     for (slot, ((&a, &b), (&c, &d))) in slots.iter_mut().zip(keys) {
-        slot.layer = blend([KeyUv(a), KeyUv(b), KeyUv(c), KeyUv(d)], weights, key_bits);
+        *slot = T::flat(blend([KeyUv(a), KeyUv(b), KeyUv(c), KeyUv(d)], weights, key_bits));
     }
 }
 
@@ -156,105 +198,48 @@ impl<'k> Beside<'k> {
     }
 }
 
-/// One row of nodes at one moment, in caller's memory: label by label, in chains.
-#[derive(Debug, Default)]
-pub struct NodeRow<'m> {
-    /// The chains.
-    pub chain: &'m mut [Chain],
-    /// How many there are.
-    pub chains: usize,
-    /// The first chain of every label; [`NONE`]: there is none. The others follow it, from left to right.
-    pub head: &'m mut [u16],
-    /// The layers, chain by chain.
-    pub node: &'m mut [Node],
-    /// Space is cubic: layers bend.
-    pub bends: bool,
-    /// There is a backdrop, which bends nowhere.
-    pub still: bool,
-    /// Fields, Q8 pixels; empty where the bundle has none.
-    pub field: &'m mut [[i16; 2]],
+/// A chain of a row at one moment, and the chains it comes from at both ends of the interval.
+struct Stretch<'k> {
+    chain: Chain,
+    start: &'k Chain,
+    end: &'k Chain,
+    grid: Grid,
+    row: usize,
 }
 
-impl NodeRow<'_> {
-    fn clear(&mut self) {
-        self.head.fill(NONE);
-        self.chains = 0;
-    }
-
-    /// Opens a chain of `label` at nodes `first` to `end`, whose layers stand from `at` on; `None` where there is no room.
+impl Stretch<'_> {
+    /// Fills in the chain's layers.
     #[inline(always)]
-    fn open(&mut self, label: u16, first: u16, end: u16, at: usize) -> Option<Chain> {
-        let chain = Chain { first, end, at: at as u16, field: NONE, label };
-        let room = at.wrapping_add(chain.nodes().into()) <= self.node.len().min(usize::from(NONE));
-        let slot = self.chain.get_mut(self.chains).filter(|_| room)?;
-        let head = self.head.get_mut(usize::from(label))?;
-        *slot = chain;
-        if *head == NONE {
-            *head = self.chains as u16;
+    fn fill<'k, T: Place>(&self, layers: &mut [T], keys: &Around<'k, '_>, moment: &Moment, beside: [&mut Beside<'k>; 2]) {
+        let slots = layers.get_mut(usize::from(self.chain.at)..).unwrap_or(&mut []);
+        let slots = slots.get_mut(..usize::from(self.chain.nodes())).unwrap_or(&mut []);
+        match keys.backdrop {
+            Some(record) if self.chain.label == BACKDROP => self.stand(slots, record, keys.key_bits),
+            _ => self.weigh(slots, keys, moment, beside),
         }
-        self.chains = self.chains.wrapping_add(1);
-        Some(chain)
     }
 
-    /// Fills the row with the layers that both ends of the interval carry in row `row` of the grid's nodes, weighted; with none
-    /// outside the grid. Returns how many there are.
+    /// Those of the backdrop, which stands still.
     #[inline(never)]
-    pub fn fill(&mut self, grid: Grid, row: Option<usize>, keys: &Around<'_, '_>, moment: &Moment) -> u32 {
-        self.clear();
-        let Some(row) = row.filter(|&row| row < grid.node_rows()) else { return 0 };
-        let [mut before, from, mut to, mut after] =
-            [keys.before, Some(keys.from), Some(keys.to), keys.after].map(|key| Beside::of(key, row));
-        let mut count = 0usize;
-        for start in from.chains {
-            let mut column = start.first;
-            while let Some(end) = to.from(start.label, column).filter(|end| end.first < start.end) {
-                let (first, stop) = (column.max(end.first), start.end.min(end.end));
-                let Some(chain) = self.open(start.label, first, stop, count) else { return count as u32 };
-                match keys.backdrop {
-                    Some(record) if chain.label == BACKDROP => self.stand(chain, record, grid, row, keys.key_bits),
-                    _ => self.weigh(chain, [start, end], keys, moment, [&mut before, &mut after]),
-                }
-                self.distances(chain, [start, end], keys, moment.linear);
-                count = count.wrapping_add(chain.nodes().into());
-                column = stop;
-                if column >= start.end {
-                    break;
-                }
-            }
-        }
-        self.bend_across();
-        count as u32
-    }
-
-    /// Fills in the layers of the backdrop's `chain`, which stands still.
-    #[inline(never)]
-    fn stand(&mut self, chain: Chain, record: &LabelRecord, grid: Grid, row: usize, key_bits: u32) {
-        let slots = self.of(&chain);
+    fn stand<T: Place>(&self, slots: &mut [T], record: &LabelRecord, key_bits: u32) {
         let layer = |column: u16| {
-            let PlayUv { u, v } = key::backdrop(record, [column, row as u16], grid.log2, key_bits);
-            Node { layer: Layer { u, v }, ..Node::NOWHERE }
+            let PlayUv { u, v } = key::backdrop(record, [column, self.row as u16], self.grid.log2, key_bits);
+            T::flat(Layer { u, v })
         };
         if record.plain() {
             slots.fill(layer(0));
             return;
         }
-        for (slot, column) in slots.iter_mut().zip(chain.first..) {
+        for (slot, column) in slots.iter_mut().zip(self.chain.first..) {
             *slot = layer(column);
         }
     }
 
-    /// Works out the layers of `chain`, which are in both `ends` of the interval; outer keys that lack one weigh nothing.
+    /// Those of others, which are in both ends of the interval; outer keys that lack one weigh nothing.
     #[inline(always)]
-    fn weigh<'k>(
-        &mut self,
-        chain: Chain,
-        [start, end]: [&Chain; 2],
-        keys: &Around<'k, '_>,
-        moment: &Moment,
-        [before, after]: [&mut Beside<'k>; 2],
-    ) {
+    fn weigh<'k, T: Place>(&self, mut slots: &mut [T], keys: &Around<'k, '_>, moment: &Moment, [before, after]: [&mut Beside<'k>; 2]) {
+        let Self { chain, start, end, .. } = self;
         let [both, no_first, no_last, neither] = &moment.weights;
-        let mut slots = self.of(&chain);
         let layers = |key: &'k Key<'_>, at: usize| key.uv.get(at..).unwrap_or(&[]);
         let mut from = layers(keys.from, start.along(chain.first));
         let mut to = layers(keys.to, end.along(chain.first));
@@ -281,6 +266,79 @@ impl NodeRow<'_> {
                 break;
             }
         }
+    }
+}
+
+/// One row of nodes at one moment, in caller's memory: label by label, in chains.
+#[derive(Debug, Default)]
+pub struct NodeRow<'m> {
+    /// The chains.
+    pub chain: &'m mut [Chain],
+    /// How many there are.
+    pub chains: usize,
+    /// The first chain of every label; [`NONE`]: there is none. The others follow it, from left to right.
+    pub head: &'m mut [u16],
+    /// The layers, chain by chain, where space is cubic,
+    pub node: &'m mut [Node],
+    /// and where it is linear: the other one is empty.
+    pub layer: &'m mut [Layer],
+    /// There is a backdrop, which bends nowhere.
+    pub still: bool,
+    /// Fields, Q8 pixels; empty where the bundle has none.
+    pub field: &'m mut [[i16; 2]],
+}
+
+impl NodeRow<'_> {
+    fn clear(&mut self) {
+        self.head.fill(NONE);
+        self.chains = 0;
+    }
+
+    /// Opens a chain of `label` at nodes `first` to `end`, whose layers stand from `at` on; `None` where there is no room.
+    #[inline(always)]
+    fn open(&mut self, label: u16, first: u16, end: u16, at: usize) -> Option<Chain> {
+        let chain = Chain { first, end, at: at as u16, field: NONE, label };
+        let room = at.wrapping_add(chain.nodes().into()) <= self.node.len().max(self.layer.len()).min(usize::from(NONE));
+        let slot = self.chain.get_mut(self.chains).filter(|_| room)?;
+        let head = self.head.get_mut(usize::from(label))?;
+        *slot = chain;
+        if *head == NONE {
+            *head = self.chains as u16;
+        }
+        self.chains = self.chains.wrapping_add(1);
+        Some(chain)
+    }
+
+    /// Fills the row with the layers that both ends of the interval carry in row `row` of the grid's nodes, weighted; with none
+    /// outside the grid. Returns how many there are.
+    #[inline(never)]
+    pub fn fill(&mut self, grid: Grid, row: Option<usize>, keys: &Around<'_, '_>, moment: &Moment) -> u32 {
+        self.clear();
+        let Some(row) = row.filter(|&row| row < grid.node_rows()) else { return 0 };
+        let [mut before, from, mut to, mut after] =
+            [keys.before, Some(keys.from), Some(keys.to), keys.after].map(|key| Beside::of(key, row));
+        let mut count = 0usize;
+        for start in from.chains {
+            let mut column = start.first;
+            while let Some(end) = to.from(start.label, column).filter(|end| end.first < start.end) {
+                let (first, stop) = (column.max(end.first), start.end.min(end.end));
+                let Some(chain) = self.open(start.label, first, stop, count) else { return count as u32 };
+                let place = Stretch { chain, start, end, grid, row };
+                if self.node.is_empty() {
+                    place.fill(self.layer, keys, moment, [&mut before, &mut after]);
+                } else {
+                    place.fill(self.node, keys, moment, [&mut before, &mut after]);
+                }
+                self.distances(chain, [start, end], keys, moment.linear);
+                count = count.wrapping_add(chain.nodes().into());
+                column = stop;
+                if column >= start.end {
+                    break;
+                }
+            }
+        }
+        self.bend_across();
+        count as u32
     }
 
     /// Works out the fields of `chain`, which is in both `ends` of the interval: straight between them, Q8 pixels.
@@ -317,7 +375,7 @@ impl NodeRow<'_> {
             if self.still && chain.label == BACKDROP {
                 continue;
             }
-            let (across, down) = (Layer::ZERO, if self.bends { UNTOLD } else { Layer::ZERO });
+            let (across, down) = (Layer::ZERO, UNTOLD);
             let [first, second, rest @ ..] = mine else {
                 mine.iter_mut().for_each(|node| *node = Node { across, down, ..*node });
                 continue;
@@ -326,9 +384,7 @@ impl NodeRow<'_> {
             (first.across, first.down) = (across, down);
             let (mut before, mut here, mut bend) = (first.layer, second, across);
             for after in rest {
-                if self.bends {
-                    bend = Layer::bend(before, here.layer, after.layer);
-                }
+                bend = Layer::bend(before, here.layer, after.layer);
                 (before, here.across, here.down) = (here.layer, bend, down);
                 here = after;
             }
@@ -407,26 +463,20 @@ impl NodeRow<'_> {
         self.field.get(usize::from(index)..).and_then(<[_]>::first_chunk).copied().unwrap_or([[1, 1]; 2])
     }
 
-    /// Layer `index` and the next one of its chain.
+    /// Layer `index` and the next one of its chain, and the sums of their second differences, across and down.
     #[must_use]
     #[inline(always)]
-    pub fn ends(&self, index: u16) -> &[Node; 2] {
-        const NONE: &[Node; 2] = &[Node::NOWHERE; 2];
-        self.from(index).first_chunk().unwrap_or(NONE)
-    }
-
-    /// Layer `index` and all that come after it, as they stand.
-    #[must_use]
-    #[inline(always)]
-    pub fn from(&self, index: u16) -> &[Node] {
-        self.node.get(usize::from(index)..).unwrap_or(&[])
-    }
-
-    /// The slots of `chain`.
-    #[inline(always)]
-    fn of(&mut self, chain: &Chain) -> &mut [Node] {
-        let slots = self.node.get_mut(usize::from(chain.at)..).unwrap_or(&mut []);
-        slots.get_mut(..usize::from(chain.nodes())).unwrap_or(&mut [])
+    pub fn ends(&self, index: u16) -> [PlayUv; 4] {
+        let none = PlayUv::default();
+        let index = usize::from(index);
+        if let Some([left, right]) = self.node.get(index..).and_then(<[_]>::first_chunk) {
+            let sum = |a: Layer, b: Layer| a.uv().plus(b.uv());
+            return [left.layer.uv(), right.layer.uv(), sum(left.across, right.across), sum(left.down, right.down)];
+        }
+        match self.layer.get(index..).and_then(<[_]>::first_chunk) {
+            Some([left, right]) => [left.uv(), right.uv(), none, none],
+            None => [none; 4],
+        }
     }
 }
 

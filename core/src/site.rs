@@ -4,9 +4,10 @@
 use crate::Bundle;
 use crate::atlas::Texture;
 use crate::coverage::Chart;
+use crate::form::Form;
 use crate::format::LabelRecord;
 use crate::key::BACKDROP;
-use crate::patch::{Form, Patch};
+use crate::patch::Patch;
 use crate::sheet::{RowSheets, Rows, Sheet};
 
 /// Blocks are at most 2^this pixels wide and high: over more of them rounding would add up to something.

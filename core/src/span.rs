@@ -4,7 +4,7 @@
 use crate::atlas::Texture;
 use crate::coverage::{Bounds, Chart, Cover};
 use crate::fixed::PlayUv;
-use crate::patch::Form;
+use crate::form::Form;
 use crate::window::{Line, Tile, fraction};
 
 /// A position in a window: v in its lower bits, [`fraction`] of them its fraction and ROWS above, then u, its upper WIDTH bits the texel.
@@ -208,7 +208,7 @@ mod tests {
                     });
                     assert_eq!(told, exact, "{patch:?}, row {row}");
                     (some, none) = (some + u32::from(exact != 0), none + u32::from(exact == 0));
-                    forms.iter_mut().for_each(crate::patch::Form::next_row);
+                    forms.iter_mut().for_each(crate::form::Form::next_row);
                 }
             }
         }

@@ -3,9 +3,9 @@
 
 use crate::atlas::Texture;
 use crate::coverage::{Bounds, Cover, Edge};
+use crate::form::Form;
 use crate::format::MAX_SHEETS;
 use crate::lists::{CHART, FIELD};
-use crate::patch::Form;
 use crate::sheet::Sheet;
 use crate::site::Site;
 use crate::span::{self, Span};

@@ -2,9 +2,10 @@
 //! which come from a block's patch; `plan` and `torn` make them, `span` draws them.
 
 use crate::coverage::Bounds;
-use crate::patch::{Patch, rounded};
+use crate::form::rounded;
+use crate::patch::Patch;
 
-/// A tile, in caller's memory: a patch of a block, as [`crate::patch::Form`] has one, of positions in a window, or differences of such, as
+/// A tile, in caller's memory: a patch of a block, as [`crate::form::Form`] has one, of positions in a window, or differences of such, as
 /// `span::Packed` holds them.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
@@ -289,9 +290,9 @@ impl Room {
 }
 
 /// How far positions of tiles of 2^`log2` pixels keep from the edges of picture and window, Q16 texels, beside what pixels reach to: rounding moves
-/// them by less. All numbers of a tile are off by up to half a unit, 1/512 texel at most, those of curves by a whole one; the tile's last pixel by half
-/// its pixels, and as many for curves.
+/// them by less. All numbers of a tile of n pixels are off by up to half a unit in its middle, 1/512 texel at most: in a corner by n^2 / 4 units, and
+/// n and a bit more.
 #[must_use]
 pub const fn margin(log2: u32) -> i32 {
-    1i32.wrapping_shl(log2.wrapping_mul(2).wrapping_add(8))
+    1i32.wrapping_shl(log2.wrapping_mul(2).wrapping_add(7))
 }

@@ -418,11 +418,12 @@ fn second_derivative([before, from, to, after]: [Option<f64>; 4]) -> Option<f64>
 #[must_use]
 pub fn rounded(cell: u32, space: u8) -> f64 {
     let cell = f64::from(cell);
-    // The corners; the product down the cell; the step across it, at its last pixel.
-    let straight = 1.0 + 2.0 + (cell - 1.0);
-    // What the nodes around add to the corners; each second difference, which is half a unit off, over cell^2 / 8 at most; half of one down the
-    // cell and half of one in the step, where they are odd.
-    let bent = SPREAD - 1.0 + cell * cell / 4.0 + 1.0 + (cell - 1.0);
+    let others = cell - 1.0;
+    // The corners; the steps across and down, at the last pixel; how the one changes along the other, of which the roundings of two steps are a part.
+    let straight = 1.0 + 2.0 * others + others * others * (1.0 + 2.0 / cell);
+    // What the nodes around add to the corners; each second difference, which is half a unit off, over cell^2 / 8 at most; half of one in the first step
+    // across and down, where they are odd.
+    let bent = SPREAD - 1.0 + cell * cell / 4.0 + 2.0 * others;
     if space == SPACE_CUBIC { straight + bent } else { straight }
 }
 
@@ -432,12 +433,13 @@ pub const SPREAD: f64 = 1.5;
 /// The side of the player's tiles, pixels, in cells of `cell` pixels.
 #[must_use]
 pub fn tile(cell: u32) -> u32 {
-    cell.min(16)
+    cell.min(8)
 }
 
-/// How far the player's positions may be off in tiles, texels, in a picture 2^`width_log2` texels wide. In tiles of n pixels a position, its steps
-/// along both axes and how the one changes along the other are each rounded to a unit, that is half a unit off, and add up to n^2 / 2 units; where
-/// space is cubic, how either step changes along its own axis is too, over at most n^2 / 8.
+/// How far the player's positions may be off in tiles, texels, in a picture 2^`width_log2` texels wide. In tiles of n pixels the position in the middle,
+/// the steps from there along both axes and how the one changes along the other are each half a unit off: at the first pixel, n / 2 of either away, the
+/// farthest of all, that adds up to 1 / 2 + n / 2 + n^2 / 8 units; where space is cubic, how either step changes along its own axis is too, over
+/// n (n + 2) / 8.
 #[must_use]
 pub fn packed(cell: u32, space: u8, width_log2: u32) -> f64 {
     let units = match width_log2 {
@@ -445,9 +447,9 @@ pub fn packed(cell: u32, space: u8, width_log2: u32) -> f64 {
         // No tiles there.
         _ => f64::INFINITY,
     };
-    let square = f64::from(tile(cell)).powi(2);
-    let bent = if space == SPACE_CUBIC { square / 8.0 } else { 0.0 };
-    (square / 2.0 + bent) / units
+    let side = f64::from(tile(cell));
+    let bent = if space == SPACE_CUBIC { side * (side + 2.0) / 8.0 } else { 0.0 };
+    (0.5 + side / 2.0 + side * side / 8.0 + bent) / units
 }
 
 /// The layers of every node of a key.

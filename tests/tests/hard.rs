@@ -17,7 +17,7 @@ use cubist_tests::play;
 use cubist_tests::reference::{self, Reference, Weights};
 
 /// Pixels that may differ from the f64 player's, percent.
-const DIFFERING: f64 = 0.4;
+const DIFFERING: f64 = 0.7;
 
 /// The lattice of pixels whose rays are checked: every so many.
 const EVERY: usize = 3;
@@ -135,9 +135,9 @@ cases! {
     on_a_surface: 32.0, 0.5, 151.0;
     coplanar_faces: 31.5, 0.8, 0.5, the_lowest_face_wins;
     slivers: 50.5, 0.1, 0.5, nothing_shows_through;
-    town: 30.5, 1.0, 5.0;
-    far_from_the_origin: 30.5, 1.0, 5.0, as_good_as_at_home;
-    a_millionth: 31.0, 0.9, 5.0, as_good_as_at_home;
+    town: 30.5, 1.0, 7.0;
+    far_from_the_origin: 30.5, 1.0, 7.0, as_good_as_at_home;
+    a_millionth: 31.0, 0.9, 7.0, as_good_as_at_home;
     a_ring_on_a_mountain: 27.0, 1.8, 184.0;
     the_apex_of_a_cone: 28.5, 0.2, 7.0;
     a_rolling_silhouette: 30.5, 1.0, 17.0;
@@ -151,7 +151,7 @@ cases! {
     a_sheet_between_two_keys: 54.0, 0.1, 0.5, it_is_seen_between_keys_only;
     a_moebius_strip: 25.0, 1.9, 5.0;
     a_soup: 26.0, 1.4, 14.0;
-    a_cut: 25.5, 1.1, 5.0;
+    a_cut: 25.5, 1.1, 7.0;
     a_standing_camera: 35.5, 0.3, 4.0, nothing_flickers;
     half_a_turn_between_two_keys: 21.5, 0.8, 46.0;
     along_rows_of_texels: 98.0, 0.1, 0.5;

@@ -183,13 +183,13 @@ fn patch_in_integers(log2: u32, nodes: [[Option<i32>; 4]; 4], [x, y]: [i64; 2]) 
     let mean = |sum: i64| fits(fits(sum) + (1 << (2 * log2 + 1))) >> (2 * log2 + 2);
     let (e, f) = (mean(edge(nodes[1]) + edge(nodes[2])), mean(edge(column(1)) + edge(column(2))));
     let n = 1 << log2;
-    let side = |line: [Option<i32>; 4]| {
-        let (from, to) = (at(line, 1), at(line, 2));
-        fits(from + ((fits(to - from) * y) >> log2) + (fits(f * y * (y - n)) >> 1))
-    };
-    let (left, right) = (side(column(1)), side(column(2)));
-    let step = fits(fits(fits(right - left) + (n >> 1)) >> log2) - (fits(e * (n - 1)) >> 1);
-    fits(left + fits(x * step) + fits(e * (x * (x - 1) / 2)))
+    let round = |value: i64| fits(fits(value) + (n >> 1)) >> log2;
+    let [[a, b], [c, d]] = [nodes[1], nodes[2]].map(|line| [at(line, 1), at(line, 2)]);
+    let (left, right) = (round(c - a), round(d - b));
+    let (down, step) = (left - (fits(f * (n - 1)) >> 1), round(b - a) - (fits(e * (n - 1)) >> 1));
+    let turn = round(right - left);
+    let row = fits(a + fits(y * down) + fits(y * (y - 1) / 2 * f));
+    fits(row + fits(x * fits(step + fits(y * turn))) + fits(x * (x - 1) / 2 * e))
 }
 
 /// The farthest that such a patch is off anywhere in its cell, units.

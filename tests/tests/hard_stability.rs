@@ -32,6 +32,7 @@ const SHAKY: [(&str, &str, [f64; 2], &str); 8] = [
     ("edge_on", "scene", [MOST, 2.0], "likewise"),
     ("far_from_the_origin", "scene", [0.5, FLIPPED], "pieces of surface are joined otherwise"),
     ("t_junctions", "scene", [0.3, FLIPPED], "likewise"),
+    ("a_soup", "scene", [MOST, 0.8], "likewise"),
     ("half_a_turn_between_two_keys", "scene", [MOST, 1.0], "what two keys do not both see is extrapolated"),
 ];
 

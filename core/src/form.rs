@@ -1,0 +1,182 @@
+//! Forms: how a number, a coordinate or a field, goes from pixel to pixel of a cell. Its numbers come from `patch` and `site`; `coverage` and `span` tell
+//! by them what shows.
+
+/// How a number goes from pixel to pixel of a patch: x pixels to the right and y down it is
+/// `at + y down + y (y - 1) / 2 fall + x (step + y turn) + x (x - 1) / 2 bend`, modulo 2^32.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Form {
+    /// At the first pixel.
+    pub at: i32,
+    /// From the first row to the second, in the first column;
+    pub down: i32,
+    /// how that changes from row to row.
+    pub fall: i32,
+    /// From the first column to the second, in the first row;
+    pub step: i32,
+    /// how that changes from row to row,
+    pub turn: i32,
+    /// and from column to column.
+    pub bend: i32,
+}
+
+/// y (y - 1) / 2.
+#[inline(always)]
+const fn triangle(y: u32) -> i32 {
+    (y.wrapping_mul(y.wrapping_sub(1)) as i32) >> 1
+}
+
+/// What is added so many `quarters` of a pixel on, by a first step and by what changes from step to step: q (q - 4) / 32 of that.
+const fn moved(step: i32, change: i32, quarters: i32) -> i32 {
+    (step.wrapping_mul(quarters) >> 2).wrapping_add(change.wrapping_mul(quarters.wrapping_mul(quarters.wrapping_sub(4))) >> 5)
+}
+
+/// `x` / 2^`log2`, to the nearest, ties up.
+#[inline(always)]
+pub const fn rounded(x: i32, log2: u32) -> i32 {
+    x.wrapping_add(1i32.wrapping_shl(log2) >> 1).wrapping_shr(log2)
+}
+
+impl Form {
+    /// In a patch of 2^`log2` pixels, given the number at its corners and the sums of its second differences there, across and down.
+    #[must_use]
+    #[inline(always)]
+    pub const fn new([a, b, c, d]: [i32; 4], [across, down]: [i32; 2], log2: u32) -> Self {
+        // Mean second differences from pixel to pixel; the first step of a curve is half of them, times its other steps, from the mean one.
+        let (bend, fall) = (rounded(across, log2.wrapping_mul(2).wrapping_add(2)), rounded(down, log2.wrapping_mul(2).wrapping_add(2)));
+        let others = 1i32.wrapping_shl(log2).wrapping_sub(1);
+        let (left, right, above) = (rounded(c.wrapping_sub(a), log2), rounded(d.wrapping_sub(b), log2), rounded(b.wrapping_sub(a), log2));
+        Self {
+            at: a,
+            down: left.wrapping_sub(fall.wrapping_mul(others) >> 1),
+            fall,
+            step: above.wrapping_sub(bend.wrapping_mul(others) >> 1),
+            turn: rounded(right.wrapping_sub(left), log2),
+            bend,
+        }
+    }
+
+    /// The number `x` pixels to the right and `y` down.
+    #[must_use]
+    #[inline(always)]
+    pub const fn at(&self, [x, y]: [u32; 2]) -> i32 {
+        self.from([x, y]).at
+    }
+
+    /// The same numbers, counted from the pixel `x` to the right and `y` down.
+    #[must_use]
+    #[inline(always)]
+    pub const fn from(&self, [x, y]: [u32; 2]) -> Self {
+        let Self { at, down, fall, step, turn, bend } = *self;
+        let (right, low) = (x as i32, y as i32);
+        let step = step.wrapping_add(turn.wrapping_mul(low));
+        let at = at.wrapping_add(down.wrapping_mul(low)).wrapping_add(fall.wrapping_mul(triangle(y)));
+        Self {
+            at: at.wrapping_add(step.wrapping_mul(right)).wrapping_add(bend.wrapping_mul(triangle(x))),
+            down: down.wrapping_add(fall.wrapping_mul(low)).wrapping_add(turn.wrapping_mul(right)),
+            step: step.wrapping_add(bend.wrapping_mul(right)),
+            ..*self
+        }
+    }
+
+    /// The numbers with the other sign.
+    #[must_use]
+    #[inline(always)]
+    pub const fn negated(&self) -> Self {
+        let Self { at, down, fall, step, turn, bend } = *self;
+        Self {
+            at: at.wrapping_neg(),
+            down: down.wrapping_neg(),
+            fall: fall.wrapping_neg(),
+            step: step.wrapping_neg(),
+            turn: turn.wrapping_neg(),
+            bend: bend.wrapping_neg(),
+        }
+    }
+
+    /// Moved by parts of a pixel: `across` and `down` quarters of one.
+    #[must_use]
+    pub const fn beside(&self, [across, down]: [i32; 2]) -> Self {
+        let Self { at, down: below, fall, step, turn, bend } = *self;
+        let step = step.wrapping_add(turn.wrapping_mul(down) >> 2);
+        Self {
+            at: at.wrapping_add(moved(below, fall, down)).wrapping_add(moved(step, bend, across)),
+            down: below.wrapping_add(fall.wrapping_mul(down) >> 2).wrapping_add(turn.wrapping_mul(across) >> 2),
+            step: step.wrapping_add(bend.wrapping_mul(across) >> 2),
+            ..*self
+        }
+    }
+
+    /// One row further down.
+    #[inline(always)]
+    pub const fn next_row(&mut self) {
+        self.at = self.at.wrapping_add(self.down);
+        self.down = self.down.wrapping_add(self.fall);
+        self.step = self.step.wrapping_add(self.turn);
+    }
+
+    /// Which of the next `pixels` pixels of the first row have a number below zero: a bit each.
+    #[must_use]
+    #[inline(always)]
+    pub fn negative(&self, pixels: u32) -> u32 {
+        let Self { at: mut value, mut step, bend, .. } = *self;
+        // Most often all of a row are on one side: where its ends are, and farther from zero than it bulges in between.
+        let last = pixels.wrapping_sub(1);
+        let end = value.wrapping_add(step.wrapping_mul(last as i32)).wrapping_add(bend.wrapping_mul(triangle(last)));
+        let bulge = bend.unsigned_abs().wrapping_mul(last.wrapping_mul(last)) >> 3;
+        // Of four pixels, telling takes as long as they do.
+        if pixels > 4 && value ^ end >= 0 && value.unsigned_abs() >= bulge && end.unsigned_abs() >= bulge {
+            return if value < 0 { u32::MAX.wrapping_shr(32u32.wrapping_sub(pixels)) } else { 0 };
+        }
+        let mut below = 0u32;
+        for pixel in 0..pixels {
+            below |= (value as u32 >> 31).wrapping_shl(pixel);
+            (value, step) = (value.wrapping_add(step), step.wrapping_add(bend));
+        }
+        below
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Form;
+
+    #[test]
+    fn forms_go_through_their_corners_and_are_what_their_formula_says() {
+        let mut seed = 5u32;
+        let mut next = |below: u32| {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            ((u64::from(seed) * u64::from(below)) >> 32) as i32 - (below / 2) as i32
+        };
+        for log2 in 2..=5 {
+            let n = 1u32 << log2;
+            for _ in 0..500 {
+                let corners = [(); 4].map(|()| next(1 << 24));
+                let (across, down) = (next(1 << 20), next(1 << 20));
+                let form = Form::new(corners, [across, down], log2);
+                // Rounded are a step for each pixel on either way, and how steps change, for each pixel.
+                let off = i64::from(n * n / 2 + n * n / 4 + n);
+                for (corner, at) in corners.into_iter().zip([[0, 0], [n, 0], [0, n], [n, n]]) {
+                    assert!(i64::from(form.at(at)).abs_diff(corner.into()) as i64 <= off, "{form:?} {at:?} {corner}");
+                }
+                let exact = |x: f64, y: f64| {
+                    let [a, b, c, d] = corners.map(f64::from);
+                    let bilinear = (a * (1.0 - x) + b * x) * (1.0 - y) + (c * (1.0 - x) + d * x) * y;
+                    bilinear - f64::from(across) / 8.0 * x * (1.0 - x) - f64::from(down) / 8.0 * y * (1.0 - y)
+                };
+                let mut row = form;
+                for y in 0..n {
+                    for x in 0..n {
+                        let value = exact(f64::from(x) / f64::from(n), f64::from(y) / f64::from(n));
+                        assert!((f64::from(form.at([x, y])) - value).abs() <= off as f64);
+                        assert_eq!(row.at([x, 0]), form.at([x, y]));
+                        let from = form.from([x, y]);
+                        assert_eq!((from.at([3, 2]), from.at([0, 1])), (form.at([x + 3, y + 2]), form.at([x, y + 1])));
+                    }
+                    let bits = (0..n).fold(0, |bits, x| bits | u32::from(form.at([x, y]) < 0) << x);
+                    assert_eq!(row.negative(n), bits, "{form:?} {y}");
+                    row.next_row();
+                }
+            }
+        }
+    }
+}
