@@ -155,7 +155,7 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, space: &mut Workspace<'
     (plan.tile, plan.mixed) = (cutter.take::<Tile>(places), cutter.take::<Mixed>(places));
     // Of larger cells' blocks fewer begin a run, and in fewer a sheet shows: what there is no room for is drawn pixel by pixel.
     plan.run = cutter.take::<Run>(grid.columns);
-    plan.side = cutter.take::<Side>(usize::from(limits.row_sheets) / blocks);
+    plan.side = cutter.take::<Side>(usize::from(limits.row_sheets).wrapping_shr(grid.log2.saturating_sub(BLOCK_LOG2)));
 }
 
 impl Bundle<'_> {

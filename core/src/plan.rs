@@ -166,19 +166,17 @@ impl Plan<'_> {
         let low = across.offset()[1] > 0;
         let bends = [top.node.get(above..).unwrap_or(&[]), bottom.node.get(below..).unwrap_or(&[])];
         let flat = [top.layer.get(above..).unwrap_or(&[]), bottom.layer.get(below..).unwrap_or(&[])];
+        // What most bundles are made of has code of its own.
         let grow = |plan: &mut Self| match (room.window, across.site.log2(), top.node.is_empty()) {
             (Window::USUAL, 3, false) => plan.grow::<9, 1, _>(most, room.margin, low, bends),
             (Window::NARROW, 3, false) => plan.grow::<8, 1, _>(most, room.margin, low, bends),
             (Window::USUAL, 4, false) => plan.grow::<9, 2, _>(most, room.margin, low, bends),
-            (Window::NARROW, 4, false) => plan.grow::<8, 2, _>(most, room.margin, low, bends),
             (Window::USUAL, 3, true) => plan.grow::<9, 1, _>(most, room.margin, low, flat),
-            (Window::NARROW, 3, true) => plan.grow::<8, 1, _>(most, room.margin, low, flat),
             (Window::USUAL, 4, true) => plan.grow::<9, 2, _>(most, room.margin, low, flat),
-            (Window::NARROW, 4, true) => plan.grow::<8, 2, _>(most, room.margin, low, flat),
             _ => 0,
         };
         let mut more = if self.follows(sheet.label(), across.block) { grow(self) } else { 0 };
-        if more == 0 && self.begin(room, sheet.label(), across.block, &Patch::new(across.site.rows, &sheet.further(along)), BULGE) {
+        if more == 0 && self.begin(room, sheet.label(), across.block, &across.site.cell(&sheet.further(along)), BULGE) {
             more = grow(self);
         }
         more

@@ -67,23 +67,31 @@ impl Site<'_, '_, '_> {
         [block, strip].map(|blocks| blocks.wrapping_shl(self.block_log2()) & most)
     }
 
+    /// What `sheet` has in its cell.
+    #[must_use]
+    #[inline(never)]
+    pub fn cell(&self, sheet: &Sheet) -> Patch {
+        Patch::new(self.rows, sheet)
+    }
+
     /// What `sheet` has in the block that is so far from its cell's left upper corner.
     #[must_use]
-    #[inline(always)]
+    // Of use in many places, and long: so are the next two.
+    #[inline(never)]
     pub fn block(&self, sheet: &Sheet, offset: [u32; 2]) -> Patch {
-        Patch::new(self.rows, sheet).part(offset, self.block_log2(), self.log2())
+        self.cell(sheet).part(offset, self.block_log2(), self.log2())
     }
 
     /// Where `sheet` is from pixel to pixel of that block: u and v, as its coverage is told from them.
     #[must_use]
-    #[inline(always)]
+    #[inline(never)]
     pub fn forms(&self, sheet: &Sheet, offset: [u32; 2]) -> [Form; 2] {
-        Patch::new(self.rows, sheet).forms(self.log2()).map(|form| form.from(offset))
+        self.cell(sheet).forms(self.log2()).map(|form| form.from(offset))
     }
 
     /// Its field `which`, Q16 pixels: straight from edge to edge of the cell, whatever space is.
     #[must_use]
-    #[inline(always)]
+    #[inline(never)]
     pub fn field(&self, sheet: &Sheet, which: usize, offset: [u32; 2]) -> Form {
         let ([top, bottom], [above, below]) = (self.rows, sheet.nodes());
         let wide = |fields: [i16; 2]| i32::from(if which == 0 { fields[0] } else { fields[1] }).wrapping_shl(8);

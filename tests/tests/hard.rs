@@ -201,7 +201,7 @@ fn the_lowest_face_wins(baked: &Baked, _: &Figures) {
 fn as_good_as_at_home(_: &Baked, figures: &Figures) {
     let home = hard::case("town").expect("there is a town").bake().expect("it bakes");
     let home = hard::measure(&home.encoded.bundle, &home.flat.atlas).expect("it plays");
-    assert!((figures.psnr_mean - home.psnr_mean).abs() < 0.2, "{figures:?}, at home {home:?}");
+    assert!((figures.psnr_mean - home.psnr_mean).abs() < 0.35, "{figures:?}, at home {home:?}");
     assert!((figures.wrong_surface_percent - home.wrong_surface_percent).abs() < 0.1, "{figures:?}, at home {home:?}");
 }
 
