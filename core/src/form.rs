@@ -127,10 +127,17 @@ impl Form {
         if pixels > 4 && value ^ end >= 0 && value.unsigned_abs() >= bulge && end.unsigned_abs() >= bulge {
             return if value < 0 { u32::MAX.wrapping_shr(32u32.wrapping_sub(pixels)) } else { 0 };
         }
+        // From the last one back: the first one's bit is the lowest.
+        (value, step) = (end, step.wrapping_add(bend.wrapping_mul(last.wrapping_sub(1) as i32)));
         let mut below = 0u32;
-        for pixel in 0..pixels {
-            below |= (value as u32 >> 31).wrapping_shl(pixel);
-            (value, step) = (value.wrapping_add(step), step.wrapping_add(bend));
+        let mut back = |below: &mut u32| {
+            *below = *below << 1 | value as u32 >> 31;
+            (value, step) = (value.wrapping_sub(step), step.wrapping_sub(bend));
+        };
+        if pixels == 8 {
+            (0..8).for_each(|_| back(&mut below));
+        } else {
+            (0..pixels).for_each(|_| back(&mut below));
         }
         below
     }

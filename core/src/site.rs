@@ -93,9 +93,27 @@ impl Site<'_, '_, '_> {
     #[must_use]
     #[inline(never)]
     pub fn field(&self, sheet: &Sheet, which: usize, offset: [u32; 2]) -> Form {
+        Form::new(self.fields(sheet, which), [0; 2], self.log2()).from(offset)
+    }
+
+    /// The same at the block's corners.
+    #[must_use]
+    #[inline(always)]
+    pub fn field_corners(&self, sheet: &Sheet, which: usize, offset: [u32; 2]) -> [i32; 4] {
+        let log2 = self.block_log2();
+        if log2 == self.log2() {
+            return self.fields(sheet, which);
+        }
+        let (field, side) = (self.field(sheet, which, offset), 1u32.wrapping_shl(log2));
+        [[0, 0], [side, 0], [0, side], [side, side]].map(|corner| field.at(corner))
+    }
+
+    /// The same at the cell's corners.
+    #[inline(always)]
+    fn fields(&self, sheet: &Sheet, which: usize) -> [i32; 4] {
         let ([top, bottom], [above, below]) = (self.rows, sheet.nodes());
         let wide = |fields: [i16; 2]| i32::from(if which == 0 { fields[0] } else { fields[1] }).wrapping_shl(8);
         let ([a, b], [c, d]) = (top.fields(above), bottom.fields(below));
-        Form::new([a, b, c, d].map(wide), [0; 2], self.log2()).from(offset)
+        [a, b, c, d].map(wide)
     }
 }

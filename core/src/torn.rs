@@ -190,7 +190,7 @@ pub fn candidates(site: &Site<'_, '_, '_>, offset: [u32; 2], sheets: &[Sheet]) -
         let mut cover = Cover::All;
         if sheet.test() != CHART {
             for which in 0..if chart.strip() { 2 } else { 1 } {
-                cover = cover.and(field_cover(&site.field(sheet, which, offset), site.block_log2()));
+                cover = cover.and(field_cover(site.field_corners(sheet, which, offset)));
             }
         }
         if sheet.test() != FIELD && cover != Cover::Nothing {
@@ -208,16 +208,14 @@ pub fn candidates(site: &Site<'_, '_, '_>, offset: [u32; 2], sheets: &[Sheet]) -
     shown | bit
 }
 
-/// How much of a block of 2^`log2` pixels a field covers.
+/// How much of a block a field of these values at its corners covers.
 #[inline(always)]
-fn field_cover(field: &Form, log2: u32) -> Cover {
+fn field_cover([a, b, c, d]: [i32; 4]) -> Cover {
     // Rounding moves a field by less than this, Q16 pixels.
-    const SLACK: i32 = 64;
-    let side = 1u32.wrapping_shl(log2);
-    let corners = [[0, 0], [side, 0], [0, side], [side, side]].map(|corner| field.at(corner));
-    if corners.iter().all(|&corner| corner > SLACK) {
+    const SLACK: i32 = 1024;
+    if a > SLACK && b > SLACK && c > SLACK && d > SLACK {
         Cover::All
-    } else if corners.iter().all(|&corner| corner < -SLACK) {
+    } else if a < -SLACK && b < -SLACK && c < -SLACK && d < -SLACK {
         Cover::Nothing
     } else {
         Cover::Part
