@@ -153,9 +153,11 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, space: &mut Workspace<'
     let plan = &mut space.plan;
     let places = grid.columns.saturating_mul(blocks);
     (plan.tile, plan.mixed) = (cutter.take::<Tile>(places), cutter.take::<Mixed>(places));
-    // Of larger cells' blocks fewer begin a run, and in fewer a sheet shows: what there is no room for is drawn pixel by pixel.
-    plan.run = cutter.take::<Run>(grid.columns);
-    plan.side = cutter.take::<Side>(usize::from(limits.row_sheets).wrapping_shr(grid.log2.saturating_sub(BLOCK_LOG2)));
+    // In larger cells most sheets show in one of two blocks, and where space is linear memory counts most: what there is no room for is drawn pixel
+    // by pixel.
+    let (runs, sides) = (if cubic { places } else { grid.columns }, usize::from(limits.row_sheets));
+    plan.run = cutter.take::<Run>(runs);
+    plan.side = cutter.take::<Side>(if cubic { sides } else { sides.wrapping_shr(grid.log2.saturating_sub(BLOCK_LOG2)) });
 }
 
 impl Bundle<'_> {
