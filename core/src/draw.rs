@@ -63,11 +63,11 @@ impl Paint for Probes {
         out: &mut [Probe],
         log2: u32,
     ) {
-        let label = run.label as u8;
+        let label = run.label;
         let make = |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(run.row) };
         match log2 {
-            3 => span::run::<_, WIDTH, ROWS, 8>(tiles, row, out, [0; 2], make),
-            _ => span::run::<_, WIDTH, ROWS, 4>(tiles, row, out, [0; 2], make),
+            3 => span::run::<_, WIDTH, ROWS, 8, true>(tiles, row, out, [0; 2], make),
+            _ => span::run::<_, WIDTH, ROWS, 4, true>(tiles, row, out, [0; 2], make),
         }
     }
 
@@ -318,7 +318,7 @@ fn block<P: Paint>(site: &Site<'_, '_, '_>, mixed: Mixed, y: u32, pixels: &mut [
         if shown == 0 {
             continue;
         }
-        let forms = site.forms(sheet, offset).map(beside);
+        let forms = site.forms(&site.cell(sheet), offset).map(beside);
         if tested && sheet.test() != FIELD {
             shown = span::inside(&chart, shown, wide, &forms, &texture);
         }

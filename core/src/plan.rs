@@ -26,7 +26,9 @@ pub struct Run {
     /// The window's first row.
     pub row: u16,
     /// The label.
-    pub label: u16,
+    pub label: u8,
+    /// Its tiles bend nowhere across: 1.
+    pub straight: u8,
 }
 
 /// [`Run::tile`]: it is all of the backdrop's one colour.
@@ -146,15 +148,16 @@ impl Plan<'_> {
     #[inline(always)]
     fn follows(&self, label: u8, place: u32) -> bool {
         let run = self.run.get(self.runs.wrapping_sub(1));
-        run.is_some_and(|run| run.label == u16::from(label) && u32::from(run.place).wrapping_add(u32::from(run.count)) == place)
+        run.is_some_and(|run| run.label == label && u32::from(run.place).wrapping_add(u32::from(run.count)) == place)
     }
 
     /// Begins a run of no tiles yet, in a window that holds `patch`, and `more` than that where it can; false where there is none.
     #[inline(never)]
-    fn begin(&mut self, room: &Room, label: u8, place: u32, patch: &Patch, more: i32) -> bool {
+    fn begin(&mut self, across: &Across<'_, '_, '_>, room: &Room, label: u8, patch: &Patch, more: i32) -> bool {
         let Some(row) = room.onwards(patch, more) else { return false };
         let Some(run) = self.run.get_mut(self.runs) else { return false };
-        *run = Run { place: place as u16, count: 0, tile: self.tiles as u16, row, label: label.into() };
+        let straight = u8::from(across.site.straight());
+        *run = Run { place: across.block as u16, count: 0, tile: self.tiles as u16, row, label, straight };
         self.runs = self.runs.wrapping_add(1);
         true
     }
@@ -167,7 +170,7 @@ impl Plan<'_> {
         let bends = [top.node.get(above..).unwrap_or(&[]), bottom.node.get(below..).unwrap_or(&[])];
         let flat = [top.layer.get(above..).unwrap_or(&[]), bottom.layer.get(below..).unwrap_or(&[])];
         // What most bundles are made of has code of its own.
-        let grow = |plan: &mut Self| match (room.window, across.site.log2(), top.node.is_empty()) {
+        let grow = |plan: &mut Self| match (room.window, across.site.log2(), across.site.straight()) {
             (Window::USUAL, 3, false) => plan.grow::<9, 1, _>(most, room.margin, low, bends),
             (Window::NARROW, 3, false) => plan.grow::<8, 1, _>(most, room.margin, low, bends),
             (Window::USUAL, 4, false) => plan.grow::<9, 2, _>(most, room.margin, low, bends),
@@ -176,7 +179,7 @@ impl Plan<'_> {
             _ => 0,
         };
         let mut more = if self.follows(sheet.label(), across.block) { grow(self) } else { 0 };
-        if more == 0 && self.begin(room, sheet.label(), across.block, &across.site.cell(&sheet.further(along)), BULGE) {
+        if more == 0 && self.begin(across, room, sheet.label(), &across.site.cell(&sheet.further(along)), BULGE) {
             more = grow(self);
         }
         more
@@ -222,10 +225,10 @@ impl Plan<'_> {
         if self.tiles >= self.tile.len() {
             return false;
         }
-        let (label, patch) = (sheet.label(), across.site.block(sheet, across.offset()));
+        let (label, patch) = (sheet.label(), across.site.block(&across.site.cell(sheet), across.offset()));
         let inside = |run: &Run| room.holds(&patch.bounds(), run.row);
         let stays = self.follows(label, across.block) && self.run.get(self.runs.wrapping_sub(1)).is_some_and(inside);
-        if !(stays || self.begin(room, label, across.block, &patch, 0)) {
+        if !(stays || self.begin(across, room, label, &patch, 0)) {
             return false;
         }
         let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return false };
@@ -247,7 +250,7 @@ impl Plan<'_> {
             return true;
         }
         let Some(run) = self.run.get_mut(self.runs) else { return false };
-        *run = Run { place, count, tile: PLAIN, row: 0, label: BACKDROP };
+        *run = Run { place, count, tile: PLAIN, row: 0, label: BACKDROP as u8, straight: 1 };
         self.runs = self.runs.wrapping_add(1);
         true
     }

@@ -38,6 +38,13 @@ impl Site<'_, '_, '_> {
         u16::from(sheet.label()) == BACKDROP && self.backdrop.is_some_and(LabelRecord::plain)
     }
 
+    /// Space is linear: nothing bends.
+    #[must_use]
+    #[inline(always)]
+    pub fn straight(&self) -> bool {
+        self.rows[0].node.is_empty()
+    }
+
     /// The chart of a sheet's label.
     #[must_use]
     #[inline(always)]
@@ -69,24 +76,24 @@ impl Site<'_, '_, '_> {
 
     /// What `sheet` has in its cell.
     #[must_use]
+    // Of use in many places, and long: so are the next ones.
     #[inline(never)]
     pub fn cell(&self, sheet: &Sheet) -> Patch {
         Patch::new(self.rows, sheet)
     }
 
-    /// What `sheet` has in the block that is so far from its cell's left upper corner.
+    /// What of `cell`, a sheet's, is in the block that is so far from its left upper corner.
     #[must_use]
-    // Of use in many places, and long: so are the next two.
-    #[inline(never)]
-    pub fn block(&self, sheet: &Sheet, offset: [u32; 2]) -> Patch {
-        self.cell(sheet).part(offset, self.block_log2(), self.log2())
+    #[inline(always)]
+    pub fn block(&self, cell: &Patch, offset: [u32; 2]) -> Patch {
+        cell.part(offset, self.block_log2(), self.log2())
     }
 
-    /// Where `sheet` is from pixel to pixel of that block: u and v, as its coverage is told from them.
+    /// Where `cell`, a sheet's, is from pixel to pixel of that block: u and v, as its coverage is told from them.
     #[must_use]
     #[inline(never)]
-    pub fn forms(&self, sheet: &Sheet, offset: [u32; 2]) -> [Form; 2] {
-        self.cell(sheet).forms(self.log2()).map(|form| form.from(offset))
+    pub fn forms(&self, cell: &Patch, offset: [u32; 2]) -> [Form; 2] {
+        cell.forms(self.log2()).map(|form| form.from(offset))
     }
 
     /// Its field `which`, Q16 pixels: straight from edge to edge of the cell, whatever space is.

@@ -39,9 +39,9 @@ impl<const WIDTH: u32, const ROWS: u32> Packed<WIDTH, ROWS> {
 }
 
 /// Paints `out`, row `row` of a run's `tiles` of `PIXELS` pixels each. `make` turns a position into a pixel, once it is moved by one of `offsets`
-/// where the pixel is an even or an odd one of its row.
+/// where the pixel is an even or an odd one of its row. Where they bend nowhere across, `BENT` may be false.
 #[inline(always)]
-pub fn run<T, const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(
+pub fn run<T, const WIDTH: u32, const ROWS: u32, const PIXELS: usize, const BENT: bool>(
     tiles: &[Tile],
     row: u32,
     out: &mut [T],
@@ -49,7 +49,8 @@ pub fn run<T, const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(
     make: impl Fn(Packed<WIDTH, ROWS>) -> T,
 ) {
     for (tile, pixels) in tiles.iter().zip(out.as_chunks_mut::<PIXELS>().0) {
-        alternate(pixels, tile.row(row), offsets, &make);
+        let [at, step, bend] = tile.row(row);
+        alternate(pixels, [at, step, if BENT { bend } else { 0 }], offsets, &make);
     }
 }
 

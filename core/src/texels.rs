@@ -243,7 +243,7 @@ impl Colours for Colours8<'_> {
         let from = usize::from(run.row).wrapping_shl(WIDTH);
         // The plan keeps windows inside the picture.
         let Some(window) = self.texture.texels.get(from..).and_then(<[u8]>::first_chunk::<TEXELS>) else { return };
-        paint_run::<_, WIDTH, ROWS>(filter, tiles, row, out, log2, |index| {
+        paint_run::<_, WIDTH, ROWS>(filter, tiles, row, out, log2, run.straight != 0, |index| {
             self.entry(window.get(index & TEXELS.wrapping_sub(1)).copied().unwrap_or(0))
         });
     }
@@ -257,14 +257,16 @@ fn paint_run<F: Filter, const WIDTH: u32, const ROWS: u32>(
     row: u32,
     out: &mut [u16],
     log2: u32,
+    straight: bool,
     colour: impl Fn(usize) -> u16,
 ) {
     let offsets = filter.offsets(WIDTH);
     let make = |at: Packed<WIDTH, ROWS>| filter.packed(at, &colour);
-    // Cells of four pixels are rare.
-    match log2 {
-        3 => span::run::<_, WIDTH, ROWS, 8>(tiles, row, out, offsets, make),
-        _ => span::run::<_, WIDTH, ROWS, 4>(tiles, row, out, offsets, make),
+    // Cells of four pixels are rare, and most pictures 512 texels wide.
+    match (log2, WIDTH, straight) {
+        (3, 9, true) => span::run::<_, WIDTH, ROWS, 8, false>(tiles, row, out, offsets, make),
+        (3, ..) => span::run::<_, WIDTH, ROWS, 8, true>(tiles, row, out, offsets, make),
+        _ => span::run::<_, WIDTH, ROWS, 4, true>(tiles, row, out, offsets, make),
     }
 }
 
@@ -314,7 +316,7 @@ impl Colours4<'_> {
     ) {
         let from = usize::from(run.row).wrapping_shl(WIDTH) >> 1;
         let Some(window) = self.texture.texels.get(from..).and_then(<[u8]>::first_chunk::<BYTES>) else { return };
-        paint_run::<_, WIDTH, ROWS>(filter, tiles, row, out, log2, |index| {
+        paint_run::<_, WIDTH, ROWS>(filter, tiles, row, out, log2, run.straight != 0, |index| {
             self.entry(window, index & BYTES.wrapping_mul(2).wrapping_sub(1))
         });
     }
@@ -409,9 +411,13 @@ impl Colours for ColoursDirect<'_> {
         let Some(window) = texels.get(from..).and_then(<[[u8; 2]]>::first_chunk::<TEXELS>) else { return };
         // A loop for either order of bytes.
         if self.swapped {
-            paint_run::<_, WIDTH, ROWS>(filter, tiles, row, out, log2, |index| pixel::<true>(window.get(index & TEXELS.wrapping_sub(1))));
+            paint_run::<_, WIDTH, ROWS>(filter, tiles, row, out, log2, run.straight != 0, |index| {
+                pixel::<true>(window.get(index & TEXELS.wrapping_sub(1)))
+            });
         } else {
-            paint_run::<_, WIDTH, ROWS>(filter, tiles, row, out, log2, |index| pixel::<false>(window.get(index & TEXELS.wrapping_sub(1))));
+            paint_run::<_, WIDTH, ROWS>(filter, tiles, row, out, log2, run.straight != 0, |index| {
+                pixel::<false>(window.get(index & TEXELS.wrapping_sub(1)))
+            });
         }
     }
 }

@@ -118,7 +118,8 @@ impl Mixed {
             let place = usize::from(self.sheet).wrapping_add(sheets.trailing_zeros() as usize);
             sheets &= sheets.wrapping_sub(1);
             let sheet = &site.sheets.sheet.get(place)?.further(self.along);
-            let patch = site.block(sheet, offset);
+            let cell = site.cell(sheet);
+            let patch = site.block(&cell, offset);
             let bounds = patch.bounds();
             let mut shown = left;
             // The last one covers what is left.
@@ -131,7 +132,7 @@ impl Mixed {
                     }
                 }
                 if sheet.test() != FIELD && shown != Shown::NONE {
-                    let forms = site.forms(sheet, offset);
+                    let forms = site.forms(&cell, offset);
                     chart.crossed(&forms, &bounds, |Edge { beyond, upper }| {
                         let near = negative(beyond, log2);
                         shown = if upper { shown.and(near) } else { shown.and_not(near) };
@@ -146,7 +147,7 @@ impl Mixed {
             }
             left = left.and_not(shown);
             // What does not show may lie anywhere.
-            let row = room.row(&bounds).or_else(|| room.row(&shown.bounds(site.forms(sheet, offset), log2)))?;
+            let row = room.row(&bounds).or_else(|| room.row(&shown.bounds(site.forms(&cell, offset), log2)))?;
             *slots.get_mut(sides)? =
                 Side { tile: room.window.tile(&patch, row, log2), shown, block: self.block, row, label: sheet.label().into() };
             sides = sides.wrapping_add(1);
@@ -194,7 +195,7 @@ pub fn candidates(site: &Site<'_, '_, '_>, offset: [u32; 2], sheets: &[Sheet]) -
             }
         }
         if sheet.test() != FIELD && cover != Cover::Nothing {
-            cover = cover.and(chart.cover(&site.block(sheet, offset).bounds(), &site.texture));
+            cover = cover.and(chart.cover(&site.block(&site.cell(sheet), offset).bounds(), &site.texture));
         }
         if cover != Cover::Nothing {
             shown |= bit;
