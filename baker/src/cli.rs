@@ -64,8 +64,9 @@ pub struct Bake {
     pub playback: Playback,
     /// Side of a cell of the key-ray grid, pixels: 4, 8, 16 or 32 [default: 8; 16 on screens over 640 wide].
     ///
-    /// Smaller cells follow outlines better and take more bytes and memory. Cells of 16 are what small processors want first: half the memory or so, and
-    /// a quarter to two fifths fewer instructions. Scenes of large flat faces show hardly a difference then, models lose .5 to 3.5 dB.
+    /// Smaller cells follow outlines better and take more bytes and memory. Cells of 16 are what small memories want first: half of it or less, a sixth to
+    /// half fewer bytes of keys, and up to a tenth fewer instructions. Scenes of large flat faces show hardly a difference on a display then, models
+    /// lose .5 to 3.5 dB.
     ///
     /// Where neither this nor --key-interval is given, lattices and foliage get cells half as large with keys twice as far apart, and rough land cells
     /// twice as large with keys twice as close, if that shows more for the bytes.
@@ -89,8 +90,8 @@ pub struct Bake {
     /// How surfaces bend between the corners of cells [default: linear where that is worth as much, else cubic].
     ///
     /// Cubic bends every cell evenly across and down, by as much as the corners around it say: large flat surfaces seen at a slant want that. Linear
-    /// takes less memory, and in cells of 4 and 8 pixels draws in a fifth to a third fewer instructions; on most models of many small faces nothing
-    /// shows the difference. Without this both are made in such cells, and the report has the figures of both. Searches (--budget, --psnr) take
+    /// takes less memory, and draws in a twentieth to a sixth fewer instructions; on most models of many small faces nothing
+    /// shows the difference. Without this both are made in cells of 4 and 8 pixels, and the report has the figures of both. Searches (--budget, --psnr) take
     /// cubic; --ram tries what fits.
     #[arg(long, value_enum, value_name = "KIND")]
     pub space: Option<Space>,

@@ -1,5 +1,5 @@
 //! Straight space: a bundle whose surfaces bend between the corners of cells comes from `job`; one where they run straight goes back if that is
-//! worth as much. It plays in a fifth to a third fewer instructions and a tenth to a fifth less memory. Large flat surfaces seen at a slant
+//! worth as much. It plays in a twentieth to a sixth fewer instructions and a tenth to a fifth less memory. Large flat surfaces seen at a slant
 //! want the curve, most meshes show no difference.
 
 use crate::bake::{BakeError, Flat, Progress, Settings};
@@ -11,7 +11,7 @@ use crate::verify;
 use cubist_core::format::SPACE_LINEAR;
 use serde::{Deserialize, Serialize};
 
-/// Side of the largest cells that go straight, pixels: in larger ones the player draws outlines pixel by pixel then, which takes longer than curves do.
+/// Side of the largest cells that go straight, pixels: in larger ones surfaces bend too much.
 const MOST: u32 = 8;
 /// What curves have to gain to be used, dB: bytes of keys count as sparing counts them.
 const GAIN: f64 = 0.1;
