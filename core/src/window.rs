@@ -5,7 +5,7 @@ use crate::coverage::Bounds;
 use crate::form::rounded;
 use crate::patch::Patch;
 
-/// A tile, in caller's memory: a patch of a block, as [`crate::form::Form`] has one, of positions in a window, or differences of such, as
+/// A tile, in caller's memory: a patch of a block, as `form::Form` has one, of positions in a window, or differences of such, as
 /// `span::Packed` holds them.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
