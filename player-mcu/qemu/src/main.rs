@@ -2,7 +2,7 @@
 //! tells instructions exactly; a line of JSON for each frame goes out by semihosting, to `cubist-mcu`.
 //!
 //! Every frame is drawn twice. The first time seek and rows are measured as a whole. The second time each row is measured on its own and
-//! the pixels are summed: the first row of a row of cells, and that of its lower half, cost what loading takes on top of what the
+//! the pixels are summed: the first rows of rows of blocks, cells or parts of larger ones, cost what loading takes on top of what the
 //! others cost, and over those the pixels of smooth and torn cells tell what each costs, by least squares (the sums go out).
 #![no_std]
 #![no_main]
