@@ -1,7 +1,7 @@
 //! Cells and keys of another shape: where so many outlines cross a cell that sheets are given up in a good part of the picture, cells half as large
-//! with keys twice as far apart may show more for the bytes, or keys twice as far apart as much for fewer; where outlines are few but positions bend
-//! on their way from key to key, keys twice as close show more, and on rough land cells twice as large besides, in less memory. A bundle baked as
-//! usual comes from `job`; the best of a few goes back.
+//! with keys twice as far apart may show more for the bytes, or keys twice as far apart as much for fewer; where positions hardly bend on their way
+//! from key to key, the latter alone; where outlines are few but positions bend, keys twice as close show more, and on rough land cells twice as large
+//! besides, in less memory. A bundle baked as usual comes from `job`; the best of a few goes back.
 
 use crate::bake::{BakeError, Flat, Progress, Settings};
 use crate::climb::{Free, Step, climb};
@@ -14,8 +14,8 @@ const TORN: f64 = 2.0;
 /// Texels that a pixel in a hundred is off by, from which on closer keys are worth a try, and keys farther apart are not. Most scenes have a half to
 /// three quarters of that.
 const BENT: f64 = 2.0;
-/// Texels of the same up to which cells smaller than [`USUAL`] are worth a try: their keys are farther apart, and what bends on the way then shows.
-/// In larger cells it may be the cell that surfaces bend in.
+/// Texels of the same up to which keys farther apart are worth a try, for their own sake and for smaller cells': what bends on the way then shows. In
+/// cells larger than [`USUAL`] it may be the cell that surfaces bend in.
 const STEADY: f64 = 1.0;
 /// Side of a cell that is neither large nor small, pixels.
 const USUAL: u32 = 8;
@@ -56,9 +56,15 @@ fn climbs(cell: u32, quality: &Quality) -> Option<(&'static [Climb], &'static st
         true if bent < STEADY || cell > USUAL => &[FINER, FARTHER],
         true if bent < BENT => &[FARTHER],
         false if bent >= BENT => &[CLOSER],
+        false if bent < STEADY => &[FARTHER],
         _ => return None,
     };
-    Some((climbs, if torn { "many outlines cross every cell" } else { "surfaces bend on their way from key to key" }))
+    let why = match torn {
+        true => "many outlines cross every cell",
+        false if bent >= BENT => "surfaces bend on their way from key to key",
+        false => "surfaces go straight on from key to key",
+    };
+    Some((climbs, why))
 }
 
 /// `usual`, or a bundle of other cells or intervals if that is worth more, as sparing counts it; and then why.

@@ -1,17 +1,16 @@
-//! Draws rows of pixels: plans a strip when its first row is asked for, then runs and mixed blocks of one row after the other.
+//! Draws rows of pixels: plans a strip when its first row is asked for, then draws tiles, and over them sides, of one row after the other.
 //! The plan is in the caller's memory; pixels go to the caller's row, as `player` asks. What fits no plan is drawn pixel by pixel.
 
 use crate::Bundle;
 use crate::fixed::PlayUv;
 use crate::form::Form;
-use crate::key::{self, BACKDROP};
+use crate::key::BACKDROP;
 use crate::lists::{CHART, FIELD};
 use crate::memory::Workspace;
-use crate::plan::{PLAIN, Plan, Run};
+use crate::plan::Plan;
 use crate::site::{BLOCK_LOG2, Site};
-use crate::span::{self, Packed, Span};
+use crate::span::{self, Packed, Span, Tiles};
 use crate::torn::{Mixed, Side};
-use crate::window::Tile;
 use crate::work::{Probe, Work};
 
 /// What pixels are made of positions.
@@ -28,15 +27,8 @@ pub trait Paint {
     /// The pixel at `uv`, which is inside the picture; `x`: whether it is an odd one of its row.
     fn at(&self, uv: PlayUv, label: u8, x: usize) -> Self::Pixel;
 
-    /// Row `row` of a run's pixels, in windows of 2^ROWS rows of 2^WIDTH texels, `TEXELS` in all; `log2`: of a tile's pixels.
-    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
-        &self,
-        run: Run,
-        tiles: &[Tile],
-        row: u32,
-        out: &mut [Self::Pixel],
-        log2: u32,
-    );
+    /// A row of tiles, in windows of 2^ROWS rows of 2^WIDTH texels, `TEXELS` in all.
+    fn tiles<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, tiles: &Tiles<'_>, out: &mut [Self::Pixel]);
 
     /// What row `row` of a mixed block shows of one of its sides, in such a window: the pixels that `shown` names, a bit each.
     fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, row: u32, shown: u32, out: &mut [Self::Pixel]);
@@ -55,26 +47,26 @@ impl Paint for Probes {
         Probe { label, at: uv }
     }
 
-    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
-        &self,
-        run: Run,
-        tiles: &[Tile],
-        row: u32,
-        out: &mut [Probe],
-        log2: u32,
-    ) {
-        let label = run.label;
-        let make = |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(run.row) };
-        match log2 {
-            3 => span::run::<_, WIDTH, ROWS, 8, true>(tiles, row, out, [0; 2], make),
-            _ => span::run::<_, WIDTH, ROWS, 4, true>(tiles, row, out, [0; 2], make),
+    fn tiles<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, tiles: &Tiles<'_>, out: &mut [Probe]) {
+        let backdrop = |uv, _| Probe { label: BACKDROP as u8, at: uv };
+        // Without a label, each tile for itself.
+        let (blocks, log2) = (out.chunks_mut(1 << tiles.log2), tiles.log2);
+        for (tile, pixels) in tiles.tiles.iter().zip(blocks) {
+            let label = tile.label;
+            let make = |row: u16, at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(row) };
+            let one = Tiles { tiles: core::slice::from_ref(tile), ..*tiles };
+            let window = |row: u16| Some(row).filter(|_| tile.in_window());
+            match log2 {
+                3 => one.paint::<_, _, WIDTH, ROWS, 8, true>(pixels, [0; 2], window, make, backdrop),
+                _ => one.paint::<_, _, WIDTH, ROWS, 4, true>(pixels, [0; 2], window, make, backdrop),
+            }
         }
     }
 
     #[inline(always)]
     fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, row: u32, shown: u32, out: &mut [Probe]) {
-        let label = side.label as u8;
-        span::part(&side.tile, row, shown, out, [0; 2], |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(side.row) });
+        let label = side.tile.label;
+        span::part(&side.tile, row, shown, out, [0; 2], |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(side.tile.row) });
     }
 }
 
@@ -99,7 +91,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
     /// Draws pixel row `y`, which lies in the row of cells.
     #[inline(always)]
     pub fn row<P: Paint>(&mut self, y: u32, out: &mut [P::Pixel], work: &mut Work, paint: &P) {
-        let out = self.runs(y, out, work, paint, false);
+        let out = self.tiles(y, out, work, paint, false);
         match self.site.bundle.texture().width_log2 {
             7 => self.mix::<P, 7, 7>(y, out, paint),
             8 => self.mix::<P, 8, 6>(y, out, paint),
@@ -108,10 +100,10 @@ impl<'d, 'a> Drawing<'d, 'a> {
         }
     }
 
-    /// Draws the runs of pixel row `y`. What there is of `out` on the screen comes back: its mixed blocks are still to be drawn; `sideless`: all of them
-    /// pixel by pixel.
+    /// Draws the tiles of pixel row `y`. What there is of `out` on the screen comes back: the rest of it is still to be drawn; `sideless`: all torn
+    /// blocks pixel by pixel.
     #[inline(always)]
-    fn runs<'o, P: Paint>(&mut self, y: u32, out: &'o mut [P::Pixel], work: &mut Work, paint: &P, sideless: bool) -> &'o mut [P::Pixel] {
+    fn tiles<'o, P: Paint>(&mut self, y: u32, out: &'o mut [P::Pixel], work: &mut Work, paint: &P, sideless: bool) -> &'o mut [P::Pixel] {
         let log2 = self.site.block_log2();
         let (strip, row) = (y >> log2, y & (1u32 << log2).wrapping_sub(1));
         let plan = &*self.plan;
@@ -121,21 +113,12 @@ impl<'d, 'a> Drawing<'d, 'a> {
         let width = self.site.bundle.size().0 as usize;
         let drawn = out.len().min(width);
         let out = out.get_mut(..drawn).unwrap_or(&mut []);
-        let Plan { tile, run: runs, runs: count, .. } = &*self.plan;
-        let mut colours = None;
-        for &run in runs.get(..*count).unwrap_or(&[]) {
-            if run.tile == PLAIN {
-                plain(run, log2, out, *colours.get_or_insert_with(|| backdrop(&self.site, paint)));
-                continue;
-            }
-            let first = usize::from(run.tile);
-            let Some(tiles) = tile.get(first..first.wrapping_add(run.count.into())) else { continue };
-            let from = usize::from(run.place).wrapping_shl(log2);
-            let to = usize::from(run.place).wrapping_add(run.count.into()).wrapping_shl(log2);
-            match out.get_mut(from..to) {
-                Some(pixels) => by_width(paint, run, tiles, row, pixels, log2, self.site.bundle.texture().width_log2),
-                None => cut(paint, run, tiles, row, out, log2, self.site.bundle.texture().width_log2),
-            }
+        let tiles = self.plan.tile.get(..self.plan.tiles).unwrap_or(&[]);
+        let tiles = Tiles { tiles, row, log2, straight: self.site.straight(), backdrop: self.plan.backdrop };
+        let width_log2 = self.site.bundle.texture().width_log2;
+        by_width(paint, &tiles, out, width_log2);
+        if out.len() & (1usize << log2).wrapping_sub(1) != 0 {
+            cut(paint, &tiles, out, width_log2);
         }
         work.smooth_pixels = work.smooth_pixels.wrapping_add(self.plan.smooth);
         work.torn_pixels = work.torn_pixels.wrapping_add(self.plan.torn);
@@ -143,7 +126,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
         out
     }
 
-    /// Draws the mixed blocks of pixel row `y`.
+    /// Draws what of pixel row `y` tiles do not show, over them.
     #[inline(never)]
     fn mix<P: Paint, const WIDTH: u32, const ROWS: u32>(&self, y: u32, out: &mut [P::Pixel], paint: &P) {
         let log2 = self.site.block_log2();
@@ -155,16 +138,13 @@ impl<'d, 'a> Drawing<'d, 'a> {
             (true, _) => self.sides::<P, WIDTH, ROWS, 8>(row, out, paint),
             (false, _) => self.any_sides::<P, WIDTH, ROWS>(row, out, paint),
         }
-        // Most often there is none.
-        if self.plan.plain > 0 {
-            for mixed in self.mixed().iter().filter(|mixed| mixed.sides == 0) {
-                let Some(pixels) = pixels(mixed.block, out, log2) else { break };
-                block(&self.site, *mixed, y, pixels, paint, None);
-            }
+        for mixed in self.mixed() {
+            let Some(pixels) = pixels(mixed.block.into(), out, log2) else { break };
+            block(&self.site, *mixed, y, pixels, paint, None);
         }
     }
 
-    /// Draws row `row` of the mixed blocks that have sides, of `PIXELS` pixels each.
+    /// Draws row `row` of the sides, of `PIXELS` pixels each.
     #[inline(always)]
     fn sides<P: Paint, const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(&self, row: u32, out: &mut [P::Pixel], paint: &P) {
         let (blocks, rest) = out.as_chunks_mut::<PIXELS>();
@@ -175,10 +155,10 @@ impl<'d, 'a> Drawing<'d, 'a> {
                 continue;
             }
             // Said twice: of a known size, a loop over pixels is none.
-            match blocks.get_mut(usize::from(side.block)) {
+            match blocks.get_mut(side.block as usize) {
                 Some(pixels) => paint.side::<WIDTH, ROWS>(side, row, shown, pixels),
                 // Those after it are beyond the row's end.
-                None if usize::from(side.block) == whole => paint.side::<WIDTH, ROWS>(side, row, shown, rest),
+                None if side.block as usize == whole => paint.side::<WIDTH, ROWS>(side, row, shown, rest),
                 None => {}
             }
         }
@@ -197,7 +177,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
         }
     }
 
-    /// The strip's mixed blocks.
+    /// The strip's blocks that are drawn pixel by pixel.
     fn mixed(&self) -> &[Mixed] {
         self.plan.mixed.get(..self.plan.mixes).unwrap_or(&[])
     }
@@ -206,9 +186,9 @@ impl<'d, 'a> Drawing<'d, 'a> {
     /// centre both ways.
     pub fn smooth<P: Paint>(&mut self, y: u32, out: &mut [P::Pixel], work: &mut Work, paint: &P, mean: impl Fn([P::Pixel; 4]) -> P::Pixel) {
         let log2 = self.site.block_log2();
-        let out = self.runs(y, out, work, paint, true);
+        let out = self.tiles(y, out, work, paint, true);
         for mixed in self.mixed() {
-            let Some(pixels) = pixels(mixed.block, out, log2) else { break };
+            let Some(pixels) = pixels(mixed.block.into(), out, log2) else { break };
             // One sheet has no outlines here: it is only that its positions fit no window.
             if mixed.sheets.is_power_of_two() {
                 block(&self.site, *mixed, y, pixels, paint, None);
@@ -232,62 +212,35 @@ impl<'d, 'a> Drawing<'d, 'a> {
 
 /// The pixels of block `block` in a row of them; `None` past its end.
 #[inline(always)]
-fn pixels<T>(block: u16, row: &mut [T], log2: u32) -> Option<&mut [T]> {
-    let first = usize::from(block).wrapping_shl(log2);
+fn pixels<T>(block: u32, row: &mut [T], log2: u32) -> Option<&mut [T]> {
+    let first = (block as usize).wrapping_shl(log2);
     let last = first.wrapping_add(1 << log2).min(row.len());
     row.get_mut(first..last)
 }
 
-/// Row `row` of a run's pixels by the width of the picture: those that `window` knows.
+/// A row of tiles by the width of the picture: those that `window` knows.
 #[inline(always)]
-fn by_width<P: Paint>(paint: &P, run: Run, tiles: &[Tile], row: u32, out: &mut [P::Pixel], log2: u32, width_log2: u32) {
+fn by_width<P: Paint>(paint: &P, tiles: &Tiles<'_>, out: &mut [P::Pixel], width_log2: u32) {
     match width_log2 {
-        7 => paint.run::<7, 7, 0x4000>(run, tiles, row, out, log2),
-        8 => paint.run::<8, 6, 0x4000>(run, tiles, row, out, log2),
-        9 => paint.run::<9, 6, 0x8000>(run, tiles, row, out, log2),
-        _ => paint.run::<10, 4, 0x4000>(run, tiles, row, out, log2),
+        7 => paint.tiles::<7, 7, 0x4000>(tiles, out),
+        8 => paint.tiles::<8, 6, 0x4000>(tiles, out),
+        9 => paint.tiles::<9, 6, 0x8000>(tiles, out),
+        _ => paint.tiles::<10, 4, 0x4000>(tiles, out),
     }
 }
 
-/// The backdrop's one colour, at even and odd pixels of a row.
+/// What there is in `out` of a last tile that reaches past its end.
 #[inline(never)]
-fn backdrop<P: Paint>(site: &Site<'_, '_, '_>, paint: &P) -> [P::Pixel; 2] {
-    let Some(record) = site.backdrop else { return [P::Pixel::default(); 2] };
-    let uv = key::backdrop(record, [0; 2], 0, site.bundle.path().key_bits.into());
-    let uv = site.texture.clamp(uv);
-    [0, 1].map(|x| paint.at(uv, BACKDROP as u8, x))
-}
-
-/// A run of one colour; tiles begin at even pixels.
-#[inline(never)]
-fn plain<T: Copy>(run: Run, log2: u32, out: &mut [T], [even, odd]: [T; 2]) {
-    let [from, to] = [run.place, run.place.wrapping_add(run.count)].map(|tile| usize::from(tile).wrapping_shl(log2).min(out.len()));
-    let Some(pixels) = out.get_mut(from..to) else { return };
-    let (eights, rest) = pixels.as_chunks_mut();
-    for eight in eights {
-        *eight = [even, odd, even, odd, even, odd, even, odd];
+fn cut<P: Paint>(paint: &P, tiles: &Tiles<'_>, out: &mut [P::Pixel], width_log2: u32) {
+    let (whole, pixels) = (out.len() >> tiles.log2, 1usize << tiles.log2);
+    let Some((tile, out)) = tiles.tiles.get(whole).zip(out.get_mut(whole << tiles.log2..)) else { return };
+    let mut made = [P::Pixel::default(); 1 << BLOCK_LOG2];
+    // What it leaves to others stays as it is.
+    made.iter_mut().zip(&*out).for_each(|(made, &pixel)| *made = pixel);
+    if let Some(made) = made.get_mut(..pixels) {
+        by_width(paint, &Tiles { tiles: core::slice::from_ref(tile), ..*tiles }, made, width_log2);
     }
-    for (pixel, colour) in rest.iter_mut().zip([even, odd, even, odd, even, odd, even]) {
-        *pixel = colour;
-    }
-}
-
-/// A run that reaches past the end of `out`: tile by tile, and of the last only what there is.
-#[inline(never)]
-fn cut<P: Paint>(paint: &P, run: Run, tiles: &[Tile], row: u32, out: &mut [P::Pixel], log2: u32, width_log2: u32) {
-    let from = usize::from(run.place).wrapping_shl(log2);
-    let mut out = out.get_mut(from..).unwrap_or(&mut []);
-    for tile in tiles {
-        let (pixels, rest) = out.split_at_mut(out.len().min(1 << log2));
-        out = rest;
-        let mut whole = [P::Pixel::default(); 1 << BLOCK_LOG2];
-        if let Some(made) = whole.get_mut(..1 << log2) {
-            by_width(paint, run, core::slice::from_ref(tile), row, made, log2, width_log2);
-        }
-        for (pixel, made) in pixels.iter_mut().zip(whole) {
-            *pixel = made;
-        }
-    }
+    out.iter_mut().zip(made).for_each(|(pixel, made)| *pixel = made);
 }
 
 /// One mixed block, front to back: the frontmost sheet that covers a pixel shows; at pixels' centres, or `beside` them, quarters of a

@@ -114,6 +114,26 @@ impl Form {
         self.step = self.step.wrapping_add(self.turn);
     }
 
+    /// Which of the first eight pixels of the first row have a number below zero, a bit each, where it bends nowhere across; the other bits are as the last
+    /// one, or zero.
+    #[must_use]
+    #[inline(always)]
+    pub fn straight_negative(&self) -> u32 {
+        let Self { at, step, .. } = *self;
+        let mut value = at.wrapping_add(step.wrapping_mul(7));
+        // Most often all are on one side.
+        if at ^ value >= 0 {
+            return (at >> 31) as u32;
+        }
+        // From the last one back: the first one's bit is the lowest.
+        let mut below = 0;
+        for _ in 0..8 {
+            below = below << 1 | value as u32 >> 31;
+            value = value.wrapping_sub(step);
+        }
+        below
+    }
+
     /// Which of the next `pixels` pixels of the first row have a number below zero: a bit each.
     #[must_use]
     #[inline(always)]

@@ -10,7 +10,7 @@ use crate::key::{BACKDROP, Chain, Key};
 use crate::lists::{self, Lists};
 use crate::nodes::{self, Layout};
 use crate::pack::{self, Picture, Recent, Scratch};
-use crate::plan::{Plan, Run};
+use crate::plan::Plan;
 use crate::record::Stream;
 use crate::row::{Layer, Node, NodeRow};
 use crate::sheet::{Found, RowSheets, Sheet, Stretch};
@@ -155,8 +155,7 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, space: &mut Workspace<'
     (plan.tile, plan.mixed) = (cutter.take::<Tile>(places), cutter.take::<Mixed>(places));
     // In larger cells most sheets show in one of two blocks, and where space is linear memory counts most: what there is no room for is drawn pixel
     // by pixel.
-    let (runs, sides) = (if cubic { places } else { grid.columns }, usize::from(limits.row_sheets));
-    plan.run = cutter.take::<Run>(runs);
+    let sides = usize::from(limits.row_sheets);
     plan.side = cutter.take::<Side>(if cubic { sides } else { sides.wrapping_shr(grid.log2.saturating_sub(BLOCK_LOG2)) });
 }
 

@@ -2,64 +2,41 @@
 //! several take turns. A strip is as many rows as a block is high. Sheets come from `sheet`, what torn cells show from `torn`; `draw` draws rows
 //! of pixels from it.
 //!
-//! Blocks that show one sheet stand in **runs** of **tiles**, neighbours of one label whose positions lie in one window of the source image. Those
-//! that show more have a tile for each, and the pixels that show it.
+//! A block is a **tile**: how its positions go, in a window of the source image. One that shows more than one sheet has a tile of the one that most of
+//! its pixels show; each other is a **side**: a tile, and the pixels that show it, drawn over that.
 
-use crate::key::BACKDROP;
-use crate::patch::Patch;
+use crate::fixed::PlayUv;
 use crate::row::{Layer, Place};
 use crate::sheet::{Sheet, Stretch};
 use crate::site::Site;
 use crate::torn::{self, Mixed, Side};
 use crate::window::{self, Middle, Room, Tile, Window};
-
-/// Neighbouring tiles that show one sheet of one label, in caller's memory.
-#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub struct Run {
-    /// The first tile, from the left of the screen.
-    pub place: u16,
-    /// How many there are.
-    pub count: u16,
-    /// The first of them in memory; [`PLAIN`]: they have none.
-    pub tile: u16,
-    /// The window's first row.
-    pub row: u16,
-    /// The label.
-    pub label: u8,
-    /// Its tiles bend nowhere across: 1.
-    pub straight: u8,
-}
-
-/// [`Run::tile`]: it is all of the backdrop's one colour.
-pub const PLAIN: u16 = u16::MAX;
+use core::slice;
 
 /// A strip's blocks, in caller's memory.
 #[derive(Debug, Default)]
 pub struct Plan<'m> {
-    /// The runs' tiles, from left to right.
+    /// A tile for every block, from left to right.
     pub tile: &'m mut [Tile],
-    /// The runs.
-    pub run: &'m mut [Run],
-    /// The other blocks.
-    pub mixed: &'m mut [Mixed],
-    /// What they show of each sheet.
+    /// What torn blocks show beside that.
     pub side: &'m mut [Side],
-    /// How many of each there are.
+    /// The blocks that have neither.
+    pub mixed: &'m mut [Mixed],
+    /// How many of each there are: tiles,
     pub tiles: usize,
-    /// Runs.
-    pub runs: usize,
-    /// Mixed blocks.
-    pub mixes: usize,
-    /// Sides.
+    /// sides,
     pub sides: usize,
-    /// Mixed blocks that are drawn pixel by pixel.
-    pub plain: usize,
+    /// mixed blocks.
+    pub mixes: usize,
+    /// The window of the last tile: its first row.
+    pub near: u16,
     /// The row of blocks it is about, from the top of the screen; none: nothing yet.
     pub strip: Option<u32>,
     /// How far around a position pixels are told from, Q16 texels.
     pub reach: i32,
-    /// Mixed blocks are not asked for their sides.
+    /// Where the backdrop is, if it is of one colour.
+    pub backdrop: PlayUv,
+    /// Torn blocks are not asked for their sides.
     pub sideless: bool,
     /// Pixels of a row in cells of one sheet.
     pub smooth: u32,
@@ -69,7 +46,7 @@ pub struct Plan<'m> {
     pub tests: u32,
 }
 
-/// Curves of runs that are extended cell by cell bulge by at most this, Q16 texels: others are looked at one by one.
+/// Cells that are laid out in a row bulge by at most this, Q16 texels: others are looked at one by one.
 const BULGE: i32 = 1 << 18;
 
 impl Plan<'_> {
@@ -77,9 +54,10 @@ impl Plan<'_> {
     /// drawn pixel by pixel.
     #[inline(never)]
     pub fn make(&mut self, site: &Site<'_, '_, '_>, strip: u32, reach: i32, sideless: bool) {
-        (self.tiles, self.runs, self.mixes, self.sides, self.plain) = (0, 0, 0, 0, 0);
+        (self.tiles, self.sides, self.mixes) = (0, 0, 0);
         (self.smooth, self.torn, self.tests) = (0, 0, 0);
         (self.strip, self.reach, self.sideless) = (Some(strip), reach, sideless);
+        self.backdrop = site.backdrop();
         let (texture, log2) = (site.bundle.texture(), site.block_log2());
         let room = Room::new(texture.width_log2, texture.height, window::margin(log2).wrapping_add(reach));
         let blocks = 1u32.wrapping_shl(site.log2().wrapping_sub(log2));
@@ -90,15 +68,31 @@ impl Plan<'_> {
                 sheets => self.cell(&mut across, stretch, sheets),
             }
         }
+        self.count();
+    }
+
+    /// Counts the tiles of every run of neighbours in one window, whatever they show.
+    fn count(&mut self) {
+        let Some((mut first, others)) = self.tile.get_mut(..self.tiles).and_then(<[_]>::split_first_mut) else { return };
+        let mut run = 1u8;
+        for tile in others {
+            if tile.row == first.row && run < u8::MAX {
+                run = run.wrapping_add(1);
+            } else {
+                first.run = run;
+                (first, run) = (tile, 1);
+            }
+        }
+        first.run = run;
     }
 
     /// Plans a stretch of cells that show one sheet.
     fn smooth(&mut self, across: &mut Across<'_, '_, '_>, stretch: Stretch, sheet: &Sheet) {
         let before = across.left;
         let mut along = 0u16;
-        if across.site.plain(sheet) {
+        if across.site.plain(sheet.label()) {
             let blocks = across.blocks.wrapping_mul(stretch.cells.into());
-            self.plain(across, blocks);
+            self.plain(blocks);
             across.step(blocks);
             along = stretch.cells;
         }
@@ -116,8 +110,7 @@ impl Plan<'_> {
             let here = sheet.further(along);
             for _ in 0..across.blocks {
                 if !self.append(across, &here) {
-                    let mixed = Mixed { sheet: stretch.sheet, sheets: 1, ..Mixed::default() };
-                    self.mix(across, Mixed { block: across.block as u16, along, ..mixed });
+                    self.block(across, slice::from_ref(&here), Mixed { sheet: stretch.sheet, along, ..Mixed::default() });
                 }
                 across.step(1);
             }
@@ -130,13 +123,7 @@ impl Plan<'_> {
     fn cell(&mut self, across: &mut Across<'_, '_, '_>, stretch: Stretch, sheets: &[Sheet]) {
         let before = across.left;
         for _ in 0..across.blocks {
-            let shown = torn::candidates(across.site, across.offset(), sheets);
-            let single = sheets.get(shown.trailing_zeros() as usize).filter(|_| shown.is_power_of_two());
-            if !single.is_some_and(|sheet| self.append(across, sheet)) {
-                self.mix(across, Mixed { block: across.block as u16, sheet: stretch.sheet, sheets: shown, ..Mixed::default() });
-                let pixels = across.width.saturating_sub(across.left).min(1 << across.log2);
-                self.tests = self.tests.wrapping_add(pixels.wrapping_mul(shown.count_ones().saturating_sub(1)));
-            }
+            self.block(across, sheets, Mixed { sheet: stretch.sheet, ..Mixed::default() });
             across.step(1);
         }
         let pixels = across.left.min(across.width).saturating_sub(before);
@@ -144,158 +131,237 @@ impl Plan<'_> {
         *kind = kind.wrapping_add(pixels);
     }
 
-    /// Whether tile `place` of `label` comes right after the last run.
-    #[inline(always)]
-    fn follows(&self, label: u8, place: u32) -> bool {
-        let run = self.run.get(self.runs.wrapping_sub(1));
-        run.is_some_and(|run| run.label == label && u32::from(run.place).wrapping_add(u32::from(run.count)) == place)
-    }
-
-    /// Begins a run of no tiles yet, in a window that holds `patch`, and `more` than that where it can; false where there is none.
-    #[inline(never)]
-    fn begin(&mut self, across: &Across<'_, '_, '_>, room: &Room, label: u8, patch: &Patch, more: i32) -> bool {
-        let Some(row) = room.onwards(patch, more) else { return false };
-        let Some(run) = self.run.get_mut(self.runs) else { return false };
-        let straight = u8::from(across.site.straight());
-        *run = Run { place: across.block as u16, count: 0, tile: self.tiles as u16, row, label, straight };
-        self.runs = self.runs.wrapping_add(1);
-        true
-    }
-
-    /// Appends smooth cells of `sheet`, from the `along`-th of its stretch on, to a run, `most` at most; returns how many.
+    /// Appends tiles of smooth cells of `sheet`, from the `along`-th of its stretch on, `most` at most; returns of how many cells.
     fn extend(&mut self, across: &Across<'_, '_, '_>, sheet: &Sheet, along: u16, most: usize) -> u16 {
         let Some(room) = &across.room else { return 0 };
         let ([top, bottom], [above, below]) = (across.site.rows, sheet.further(along).nodes().map(usize::from));
-        let low = across.offset()[1] > 0;
+        let cells = Cells { room, label: sheet.label(), low: across.offset()[1] > 0, most, near: self.near };
         let bends = [top.node.get(above..).unwrap_or(&[]), bottom.node.get(below..).unwrap_or(&[])];
         let flat = [top.layer.get(above..).unwrap_or(&[]), bottom.layer.get(below..).unwrap_or(&[])];
         // What most bundles are made of has code of its own.
-        let grow = |plan: &mut Self| match (room.window, across.site.log2(), across.site.straight()) {
-            (Window::USUAL, 3, false) => plan.grow::<9, 1, _>(most, room.margin, low, bends),
-            (Window::NARROW, 3, false) => plan.grow::<8, 1, _>(most, room.margin, low, bends),
-            (Window::USUAL, 4, false) => plan.grow::<9, 2, _>(most, room.margin, low, bends),
-            (Window::USUAL, 3, true) => plan.grow::<9, 1, _>(most, room.margin, low, flat),
-            (Window::USUAL, 4, true) => plan.grow::<9, 2, _>(most, room.margin, low, flat),
+        match (room.window, across.site.log2(), across.site.straight()) {
+            (Window::USUAL, 3, false) => self.grow::<9, 1, _>(&cells, bends),
+            (Window::NARROW, 3, false) => self.grow::<8, 1, _>(&cells, bends),
+            (Window::USUAL, 4, false) => self.grow::<9, 2, _>(&cells, bends),
+            (Window::USUAL, 3, true) => self.grow::<9, 1, _>(&cells, flat),
+            (Window::USUAL, 4, true) => self.grow::<9, 2, _>(&cells, flat),
             _ => 0,
-        };
-        let mut more = if self.follows(sheet.label(), across.block) { grow(self) } else { 0 };
-        if more == 0 && self.begin(across, room, sheet.label(), &across.site.cell(&sheet.further(along)), BULGE) {
-            more = grow(self);
         }
-        more
     }
 
-    /// Appends cells of so many `TILES` a row of blocks to the last run, which they follow, as long as they fit into its window, `most` at most; returns
-    /// how many. The `lines` above and below start at their left corners; `low`: of cells of two rows of blocks it is the lower one.
+    /// Appends tiles of `cells` of so many `TILES` a row of blocks, as long as each fits a window; returns of how many. The `lines` above and below start
+    /// at their left corners.
     #[inline(never)]
-    fn grow<const WIDTH: u32, const TILES: usize, T: Place>(&mut self, most: usize, margin: i32, low: bool, lines: [&[T]; 2]) -> u16 {
-        let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return 0 };
+    fn grow<const WIDTH: u32, const TILES: usize, T: Place>(&mut self, cells: &Cells<'_>, lines: [&[T]; 2]) -> u16 {
         let Some(slots) = self.tile.get_mut(self.tiles..).map(|slots| slots.as_chunks_mut::<TILES>().0) else { return 0 };
-        let Some(slots) = slots.get_mut(..most) else { return 0 };
+        let Some(slots) = slots.get_mut(..cells.most) else { return 0 };
         let window = Window { width_log2: WIDTH, ..Window::USUAL };
-        let margin = margin.wrapping_add(BULGE);
         // An axis after the other: what is known of both at a time would not fit a small processor's registers.
-        let done = lay::<true, TILES, T>(slots, lines, i32::from(run.row).wrapping_shl(16), margin, low, window);
-        let done = lay::<false, TILES, T>(slots.get_mut(..done).unwrap_or(&mut []), lines, 0, margin, low, window);
-        let tiles = done.wrapping_mul(TILES);
-        run.count = run.count.wrapping_add(tiles as u16);
-        self.tiles = self.tiles.wrapping_add(tiles);
+        let done = lay_down::<TILES, T>(slots, lines, cells, window);
+        let done = lay_across::<TILES, T>(slots.get_mut(..done).unwrap_or(&mut []), lines, cells, window);
+        self.near = slots.get(done.wrapping_sub(1)).and_then(|tiles| tiles.last()).map_or(self.near, |last| last.row);
+        self.tiles = self.tiles.wrapping_add(done.wrapping_mul(TILES));
         done as u16
     }
 
-    /// Adds a block that no run has, with its sides where it has such.
-    fn mix(&mut self, across: &Across<'_, '_, '_>, mixed: Mixed) {
+    /// Plans the block at `across`, of a cell of `sheets`: by sides, the one that most pixels show as a tile of a run; where it has none, pixel by pixel,
+    /// as `mixed` says.
+    fn block(&mut self, across: &Across<'_, '_, '_>, sheets: &[Sheet], mixed: Mixed) {
+        let (site, offset) = (across.site, across.offset());
+        let tests = |sheets: u32| {
+            let pixels = across.width.saturating_sub(across.left).min(1 << across.log2);
+            pixels.wrapping_mul(sheets.saturating_sub(1))
+        };
         let free = self.side.get_mut(self.sides..).unwrap_or(&mut []);
         let room = across.room.as_ref().filter(|_| !self.sideless);
-        let sides = room.and_then(|room| mixed.share(across.site, across.strip, room, free)).unwrap_or(0);
+        if let Some(share) = room.and_then(|room| torn::share(site, across.block, offset, sheets, (room, self.near), free)) {
+            self.tests = self.tests.wrapping_add(tests(share.sheets));
+            let first = self.sides;
+            self.sides = first.wrapping_add(share.sides);
+            self.base(site, share.most.map(|most| first.wrapping_add(most)));
+            return;
+        }
+        let shown = torn::candidates(site, offset, sheets);
+        let single = sheets.get(shown.trailing_zeros() as usize).filter(|_| shown.is_power_of_two());
+        if single.is_some_and(|sheet| self.append(across, sheet)) {
+            return;
+        }
+        self.tests = self.tests.wrapping_add(tests(shown.count_ones()));
+        self.put(Tile::NONE);
         if let Some(slot) = self.mixed.get_mut(self.mixes) {
-            *slot = Mixed { sides: sides as u16, ..mixed };
-            (self.mixes, self.sides) = (self.mixes.wrapping_add(1), self.sides.wrapping_add(sides));
-            self.plain = self.plain.wrapping_add(usize::from(sides == 0));
+            *slot = Mixed { block: across.block as u16, sheets: shown, ..mixed };
+            self.mixes = self.mixes.wrapping_add(1);
         }
     }
 
-    /// Appends the block at `across`, which shows one sheet, to the last run, or begins another; false where its positions fit no window.
+    /// Makes side `side` the tile of its block, drawn all over it before the other sides are drawn over that; none: it has only sides.
+    #[inline(always)]
+    fn base(&mut self, site: &Site<'_, '_, '_>, side: Option<usize>) {
+        let sides = self.side.get_mut(..self.sides).unwrap_or(&mut []);
+        let (Some(side), Some((last, others))) = (side, sides.split_last_mut()) else { return self.put(Tile::NONE) };
+        let mut tile = last.tile;
+        // The last one takes its place.
+        if let Some(slot) = others.get_mut(side) {
+            (tile, *slot) = (slot.tile, *last);
+        }
+        self.sides = others.len();
+        if site.plain(tile.label) { self.plain(1) } else { self.put(tile) }
+    }
+
+    /// Appends the block at `across`, which shows one sheet; false where its positions fit no window.
     #[inline(never)]
     fn append(&mut self, across: &Across<'_, '_, '_>, sheet: &Sheet) -> bool {
-        if across.site.plain(sheet) {
-            return self.plain(across, 1);
+        if across.site.plain(sheet.label()) {
+            self.plain(1);
+            return true;
         }
         let Some(room) = &across.room else { return false };
-        if self.tiles >= self.tile.len() {
-            return false;
-        }
-        let (label, patch) = (sheet.label(), across.site.block(&across.site.cell(sheet), across.offset()));
-        let inside = |run: &Run| room.holds(&patch.bounds(), run.row);
-        let stays = self.follows(label, across.block) && self.run.get(self.runs.wrapping_sub(1)).is_some_and(inside);
-        if !(stays || self.begin(across, room, label, &patch, 0)) {
-            return false;
-        }
-        let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1)) else { return false };
-        let Some(slot) = self.tile.get_mut(self.tiles) else { return false };
-        *slot = room.window.tile(&patch, run.row, across.log2);
-        run.count = run.count.wrapping_add(1);
-        self.tiles = self.tiles.wrapping_add(1);
+        let patch = across.site.block(&across.site.cell(sheet), across.offset());
+        let Some(row) = room.row(&patch.bounds(), self.near) else { return false };
+        self.put(room.window.tile(&patch, sheet.label(), row, across.log2));
         true
     }
 
-    /// Appends so many `blocks` of the backdrop's one colour to the last run, or begins another.
-    fn plain(&mut self, across: &Across<'_, '_, '_>, blocks: u32) -> bool {
-        let [place, count] = [across.block, blocks].map(|blocks| blocks as u16);
-        if let Some(run) = self.run.get_mut(self.runs.wrapping_sub(1))
-            && run.tile == PLAIN
-            && run.place.wrapping_add(run.count) == place
-        {
-            run.count = run.count.wrapping_add(count);
-            return true;
+    /// Appends so many `blocks` of the backdrop's one colour.
+    fn plain(&mut self, blocks: u32) {
+        (0..blocks).for_each(|_| self.put(Tile::PLAIN));
+    }
+
+    /// Appends a tile.
+    #[inline(always)]
+    fn put(&mut self, tile: Tile) {
+        if let Some(slot) = self.tile.get_mut(self.tiles) {
+            *slot = tile;
+            self.tiles = self.tiles.wrapping_add(1);
+            if tile.in_window() {
+                self.near = tile.row;
+            }
         }
-        let Some(run) = self.run.get_mut(self.runs) else { return false };
-        *run = Run { place, count, tile: PLAIN, row: 0, label: BACKDROP as u8, straight: 1 };
-        self.runs = self.runs.wrapping_add(1);
-        true
     }
 }
 
-/// Fills `slots` with v (`DOWN`), or adds u, of the tiles of cells between nodes above and below, as long as these lie a `margin` inside the window,
-/// which begins at `first`; returns how many do. Of cells of two tiles a row, `low` says which row it is.
+/// Smooth cells of one label, from left to right, that tiles are wanted of.
+struct Cells<'r> {
+    room: &'r Room,
+    label: u8,
+    /// Of cells of two rows of blocks it is the lower one.
+    low: bool,
+    /// How many, at most.
+    most: usize,
+    /// The window to their left: its first row.
+    near: u16,
+}
+
+impl Cells<'_> {
+    /// How far nodes keep from the edges of a window, Q16 texels.
+    const fn margin(&self) -> i32 {
+        self.room.margin.wrapping_add(BULGE)
+    }
+
+    /// The first row of a window for the cell whose v are these at its corners, one that has room where they are heading.
+    #[inline(never)]
+    fn window(&self, [a, b, c, d]: [i32; 4]) -> i32 {
+        if b.wrapping_add(d) >= a.wrapping_add(c) {
+            self.room.first(a.min(c).min(b.min(d)), self.margin())
+        } else {
+            self.room.first_to(a.max(c).max(b.max(d)), self.margin())
+        }
+    }
+
+    /// The tiles of the cell that has these numbers at its corners, and these sums of second differences; `lane`: theirs.
+    #[inline(always)]
+    fn tiles<const TILES: usize>(&self, corners: [i32; 4], sums: [i32; 2], more: i32, lane: impl Fn(i32, u32) -> u32) -> [Tile; TILES] {
+        let log2 = if TILES == 1 { 3 } else { 4 };
+        let cell = Middle::new(corners, sums, log2).plus(more);
+        let tile = |right: bool| if TILES == 1 { cell } else { cell.quarter(right, self.low, log2) }.lanes(3, &lane);
+        core::array::from_fn(|right| tile(right > 0))
+    }
+}
+
+/// It bulges by a 32nd of each of these `sums` of second differences: by more than rows of cells are made for.
 #[inline(always)]
-fn lay<const DOWN: bool, const TILES: usize, T: Place>(
+const fn bulges([across, down]: [i32; 2]) -> bool {
+    const MOST: u32 = (BULGE as u32) << 4;
+    (across as u32).wrapping_add(MOST) | (down as u32).wrapping_add(MOST) >= 2 * MOST
+}
+
+/// The sums of second differences of two nodes, one above the other, of a number that is `one` of a layer's two.
+#[inline(always)]
+fn sums<T: Place>(above: &T, below: &T, one: impl Fn(Layer) -> i32) -> [i32; 2] {
+    let ([a, b], [c, d]) = (above.bends().map(&one), below.bends().map(&one));
+    [a.wrapping_add(c), b.wrapping_add(d)]
+}
+
+/// Fills `slots` with v of the tiles of `cells` between nodes above and below, and their windows, as long as there are such; returns of how many cells.
+#[inline(always)]
+fn lay_down<const TILES: usize, T: Place>(
     slots: &mut [[Tile; TILES]],
     [above, below]: [&[T]; 2],
-    first: i32,
-    margin: i32,
-    low: bool,
+    cells: &Cells<'_>,
     window: Window,
 ) -> usize {
-    let one = |layer: Layer| if DOWN { layer.uv().v } else { layer.uv().u };
-    let log2 = if DOWN { window.rows_log2 } else { window.width_log2 };
+    let v = |layer: Layer| layer.uv().v;
+    let margin = cells.margin();
     // From the margin on: inside is what is not negative and below the room, one comparison for both.
-    let room = 1u32.wrapping_shl(log2.wrapping_add(16)).wrapping_sub((margin as u32).wrapping_mul(2));
-    let corner = first.wrapping_add(margin);
+    let room = 1u32.wrapping_shl(window.rows_log2.wrapping_add(16)).wrapping_sub((margin as u32).wrapping_mul(2));
+    let inside = |v: i32, row: i32| (v.wrapping_sub(row.wrapping_shl(16)).wrapping_sub(margin) as u32) < room;
+    let mut row = i32::from(cells.near);
     let mut edges = above.iter().zip(below);
-    let at = |node: &T| one(node.layer()).wrapping_sub(corner);
-    let sums = |above: &T, below: &T| {
-        let ([a, b], [c, d]) = (above.bends().map(one), below.bends().map(one));
-        [a.wrapping_add(c), b.wrapping_add(d)]
-    };
     let Some((above, below)) = edges.next() else { return 0 };
-    let ([mut a, mut c], mut left) = ([at(above), at(below)], sums(above, below));
+    let ([mut a, mut c], mut left) = ([v(above.layer()), v(below.layer())], sums(above, below, v));
+    let mut held = inside(a, row) && inside(c, row);
     let mut done = 0usize;
     for (slots, (above, below)) in slots.iter_mut().zip(edges) {
-        let ([b, d], right) = ([at(above), at(below)], sums(above, below));
-        let bends = [left[0].wrapping_add(right[0]), left[1].wrapping_add(right[1])];
-        // It bulges by a 32nd of each.
-        const MOST: u32 = (BULGE as u32) << 4;
-        let bulges = (bends[0] as u32).wrapping_add(MOST) | (bends[1] as u32).wrapping_add(MOST);
-        if b as u32 >= room || d as u32 >= room || bulges >= 2 * MOST {
+        let ([b, d], right) = ([v(above.layer()), v(below.layer())], sums(above, below, v));
+        let all = [left[0].wrapping_add(right[0]), left[1].wrapping_add(right[1])];
+        if !(held && inside(b, row) && inside(d, row)) {
+            row = cells.window([a, b, c, d]);
+            if ![a, b, c, d].into_iter().all(|v| inside(v, row)) {
+                break;
+            }
+            held = true;
+        }
+        if bulges(all) {
             break;
         }
-        let log2 = if TILES == 1 { 3 } else { 4 };
-        let cell = Middle::new([a, b, c, d], bends, log2).plus(margin);
-        for (slot, right) in slots.iter_mut().zip([false, true]) {
-            let block = if TILES == 1 { cell } else { cell.quarter(right, low, log2) };
-            let tile = block.lanes(3, |x, log2| window.lane::<DOWN>(x, log2));
-            *slot = if DOWN { tile } else { slot.plus(&tile).from_middle(3) };
+        let first = row.wrapping_shl(16);
+        let tiles = cells.tiles::<TILES>([a, b, c, d], all, first.wrapping_neg(), |x, log2| window.lane::<true>(x, log2));
+        *slots = tiles.map(|tile| tile.of(cells.label, row as u16));
+        (a, c, left) = (b, d, right);
+        done = done.wrapping_add(1);
+    }
+    done
+}
+
+/// Adds u to the tiles in `slots`, likewise.
+#[inline(always)]
+fn lay_across<const TILES: usize, T: Place>(
+    slots: &mut [[Tile; TILES]],
+    [above, below]: [&[T]; 2],
+    cells: &Cells<'_>,
+    window: Window,
+) -> usize {
+    let margin = cells.margin();
+    // From the margin on: inside is what is not negative and below the room, one comparison for both.
+    let room = 1u32.wrapping_shl(window.width_log2.wrapping_add(16)).wrapping_sub((margin as u32).wrapping_mul(2));
+    let u = |layer: Layer| layer.uv().u;
+    let at = |node: &T| u(node.layer()).wrapping_sub(margin);
+    let mut edges = above.iter().zip(below);
+    let Some((above, below)) = edges.next() else { return 0 };
+    let ([mut a, mut c], mut left) = ([at(above), at(below)], sums(above, below, u));
+    if a as u32 >= room || c as u32 >= room {
+        return 0;
+    }
+    let mut done = 0usize;
+    for (slots, (above, below)) in slots.iter_mut().zip(edges) {
+        let ([b, d], right) = ([at(above), at(below)], sums(above, below, u));
+        let all = [left[0].wrapping_add(right[0]), left[1].wrapping_add(right[1])];
+        if b as u32 >= room || d as u32 >= room || bulges(all) {
+            break;
+        }
+        let tiles = cells.tiles::<TILES>([a, b, c, d], all, margin, |x, log2| window.lane::<false>(x, log2));
+        for (slot, tile) in slots.iter_mut().zip(tiles) {
+            *slot = slot.plus(&tile).from_middle(3);
         }
         (a, c, left) = (b, d, right);
         done = done.wrapping_add(1);

@@ -4,9 +4,10 @@
 use crate::Bundle;
 use crate::atlas::Texture;
 use crate::coverage::Chart;
+use crate::fixed::PlayUv;
 use crate::form::Form;
 use crate::format::LabelRecord;
-use crate::key::BACKDROP;
+use crate::key::{self, BACKDROP};
 use crate::patch::Patch;
 use crate::sheet::{RowSheets, Rows, Sheet};
 
@@ -31,11 +32,19 @@ pub struct Site<'s, 'a, 'm> {
 }
 
 impl Site<'_, '_, '_> {
-    /// The sheet is the backdrop, and of one colour.
+    /// `label` is the backdrop's, and that is of one colour.
     #[must_use]
     #[inline(always)]
-    pub fn plain(&self, sheet: &Sheet) -> bool {
-        u16::from(sheet.label()) == BACKDROP && self.backdrop.is_some_and(LabelRecord::plain)
+    pub fn plain(&self, label: u8) -> bool {
+        u16::from(label) == BACKDROP && self.backdrop.is_some_and(LabelRecord::plain)
+    }
+
+    /// Where the backdrop is, inside the picture, if it is of one colour.
+    #[must_use]
+    #[inline(never)]
+    pub fn backdrop(&self) -> PlayUv {
+        let at = |record| key::backdrop(record, [0; 2], 0, self.bundle.path().key_bits.into());
+        self.texture.clamp(self.backdrop.map(at).unwrap_or_default())
     }
 
     /// Space is linear: nothing bends.

@@ -38,19 +38,51 @@ impl<const WIDTH: u32, const ROWS: u32> Packed<WIDTH, ROWS> {
     }
 }
 
-/// Paints `out`, row `row` of a run's `tiles` of `PIXELS` pixels each. `make` turns a position into a pixel, once it is moved by one of `offsets`
-/// where the pixel is an even or an odd one of its row. Where they bend nowhere across, `BENT` may be false.
-#[inline(always)]
-pub fn run<T, const WIDTH: u32, const ROWS: u32, const PIXELS: usize, const BENT: bool>(
-    tiles: &[Tile],
-    row: u32,
-    out: &mut [T],
-    offsets: [u32; 2],
-    make: impl Fn(Packed<WIDTH, ROWS>) -> T,
-) {
-    for (tile, pixels) in tiles.iter().zip(out.as_chunks_mut::<PIXELS>().0) {
-        let [at, step, bend] = tile.row(row);
-        alternate(pixels, [at, step, if BENT { bend } else { 0 }], offsets, &make);
+/// A row of tiles to paint.
+#[derive(Clone, Copy, Debug)]
+pub struct Tiles<'t> {
+    /// From left to right.
+    pub tiles: &'t [Tile],
+    /// Which row of their pixels.
+    pub row: u32,
+    /// They are 2^this pixels wide.
+    pub log2: u32,
+    /// They bend nowhere across.
+    pub straight: bool,
+    /// Where the backdrop is, if it is of one colour.
+    pub backdrop: PlayUv,
+}
+
+impl Tiles<'_> {
+    /// Paints `out`, tiles of `PIXELS` pixels each. `window` gives the texels of that from some row on, of which `make` turns a position into a pixel, once
+    /// it is moved by one of `offsets` where the pixel is an even or an odd one of its row; `at` one anywhere in the picture. Where they bend
+    /// nowhere across, `BENT` may be false.
+    #[inline(always)]
+    pub fn paint<T: Copy, W: Copy, const WIDTH: u32, const ROWS: u32, const PIXELS: usize, const BENT: bool>(
+        &self,
+        out: &mut [T],
+        offsets: [u32; 2],
+        window: impl Fn(u16) -> Option<W>,
+        make: impl Fn(W, Packed<WIDTH, ROWS>) -> T,
+        at: impl Fn(PlayUv, usize) -> T,
+    ) {
+        let (mut tiles, mut blocks) = (self.tiles, out.as_chunks_mut::<PIXELS>().0.iter_mut());
+        while let Some(first) = tiles.first() {
+            let (here, others) = tiles.split_at(usize::from(first.run).clamp(1, tiles.len()));
+            tiles = others;
+            let Some(window) = window(first.row) else {
+                let [even, odd] = [0, 1].map(|x| at(self.backdrop, x));
+                for pixels in blocks.by_ref().take(here.len()).filter(|_| first.is_plain()) {
+                    *pixels = core::array::from_fn(|x| if x & 1 == 0 { even } else { odd });
+                }
+                continue;
+            };
+            // The last tile may reach past the end.
+            for (tile, pixels) in here.iter().zip(blocks.by_ref()) {
+                let [at, step, bend] = tile.row(self.row);
+                alternate(pixels, [at, step, if BENT { bend } else { 0 }], offsets, |at| make(window, at));
+            }
+        }
     }
 }
 
@@ -68,7 +100,7 @@ fn alternate<T, const WIDTH: u32, const ROWS: u32>(
     }
 }
 
-/// Paints those of `pixels`, row `row` of `tile`, that `shown` names, a bit each, like [`run`].
+/// Paints those of `pixels`, row `row` of `tile`, that `shown` names, a bit each, like [`Tiles::paint`].
 #[inline(always)]
 pub fn part<T, const WIDTH: u32, const ROWS: u32>(
     tile: &Tile,

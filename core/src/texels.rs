@@ -19,11 +19,9 @@ use crate::filter::{Bilinear, Dither, Filter, Nearest, mean};
 use crate::fixed::PlayUv;
 use crate::format::TexelKind;
 use crate::pack::{self, Picture, Scratch};
-use crate::plan::Run;
 use crate::playing::{Look, Playing};
-use crate::span::{self, Packed};
+use crate::span::{self, Packed, Tiles};
 use crate::torn::Side;
-use crate::window::Tile;
 
 /// A kind of texels, or several, that a [`crate::Player`] plays: [`Indexed8`], [`Indexed4`], [`Direct565`] or [`AnyTexels`].
 pub trait Texels: Source {}
@@ -161,15 +159,12 @@ trait Colours {
     /// The colour of the picture's texel `index`; black past the last.
     fn colour(&self, index: usize) -> u16;
 
-    /// A run's pixels, as [`Paint::run`] has them.
-    fn run<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
+    /// A row of tiles, as [`Paint::tiles`] has it.
+    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
         &self,
         filter: F,
-        run: Run,
-        tiles: &[Tile],
-        row: u32,
+        tiles: &Tiles<'_>,
         out: &mut [u16],
-        log2: u32,
     );
 }
 
@@ -190,13 +185,13 @@ impl<C: Colours, F: Filter> Paint for Lookup<C, F> {
     }
 
     #[inline(always)]
-    fn run<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, run: Run, tiles: &[Tile], row: u32, out: &mut [u16], log2: u32) {
-        self.colours.run::<F, WIDTH, ROWS, TEXELS>(self.filter, run, tiles, row, out, log2);
+    fn tiles<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, tiles: &Tiles<'_>, out: &mut [u16]) {
+        self.colours.tiles::<F, WIDTH, ROWS, TEXELS>(self.filter, tiles, out);
     }
 
     #[inline(always)]
     fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, row: u32, shown: u32, out: &mut [u16]) {
-        let from = usize::from(side.row).wrapping_shl(WIDTH);
+        let from = usize::from(side.tile.row).wrapping_shl(WIDTH);
         span::part(&side.tile, row, shown, out, self.filter.offsets(WIDTH), |at: Packed<WIDTH, ROWS>| {
             self.filter.packed(at, |index| self.colours.colour(from.wrapping_add(index)))
         });
@@ -231,42 +226,38 @@ impl Colours for Colours8<'_> {
 
     // A function of its own: the loop needs all registers.
     #[inline(never)]
-    fn run<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
+    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
         &self,
         filter: F,
-        run: Run,
-        tiles: &[Tile],
-        row: u32,
+        tiles: &Tiles<'_>,
         out: &mut [u16],
-        log2: u32,
     ) {
-        let from = usize::from(run.row).wrapping_shl(WIDTH);
         // The plan keeps windows inside the picture.
-        let Some(window) = self.texture.texels.get(from..).and_then(<[u8]>::first_chunk::<TEXELS>) else { return };
-        paint_run::<_, WIDTH, ROWS>(filter, tiles, row, out, log2, run.straight != 0, |index| {
+        let window = |row: u16| self.texture.texels.get(usize::from(row).wrapping_shl(WIDTH)..).and_then(<[u8]>::first_chunk::<TEXELS>);
+        paint::<_, _, _, WIDTH, ROWS>(self, filter, tiles, out, window, |window, index| {
             self.entry(window.get(index & TEXELS.wrapping_sub(1)).copied().unwrap_or(0))
         });
     }
 }
 
-/// A run's pixels, of colours of a window's texels.
+/// A row of tiles, of colours of their windows' texels.
 #[inline(always)]
-fn paint_run<F: Filter, const WIDTH: u32, const ROWS: u32>(
+fn paint<C: Colours, F: Filter, W: Copy, const WIDTH: u32, const ROWS: u32>(
+    colours: &C,
     filter: F,
-    tiles: &[Tile],
-    row: u32,
+    tiles: &Tiles<'_>,
     out: &mut [u16],
-    log2: u32,
-    straight: bool,
-    colour: impl Fn(usize) -> u16,
+    window: impl Fn(u16) -> Option<W>,
+    colour: impl Fn(W, usize) -> u16,
 ) {
+    let at = |uv, x| filter.at(uv, x, colours.texture(), |index| colours.colour(index));
     let offsets = filter.offsets(WIDTH);
-    let make = |at: Packed<WIDTH, ROWS>| filter.packed(at, &colour);
+    let make = |window: W, at: Packed<WIDTH, ROWS>| filter.packed(at, |index| colour(window, index));
     // Cells of four pixels are rare, and most pictures 512 texels wide.
-    match (log2, WIDTH, straight) {
-        (3, 9, true) => span::run::<_, WIDTH, ROWS, 8, false>(tiles, row, out, offsets, make),
-        (3, ..) => span::run::<_, WIDTH, ROWS, 8, true>(tiles, row, out, offsets, make),
-        _ => span::run::<_, WIDTH, ROWS, 4, true>(tiles, row, out, offsets, make),
+    match (tiles.log2, WIDTH, tiles.straight) {
+        (3, 9, true) => tiles.paint::<_, W, WIDTH, ROWS, 8, false>(out, offsets, window, make, at),
+        (3, ..) => tiles.paint::<_, W, WIDTH, ROWS, 8, true>(out, offsets, window, make, at),
+        _ => tiles.paint::<_, W, WIDTH, ROWS, 4, true>(out, offsets, window, make, at),
     }
 }
 
@@ -303,20 +294,16 @@ impl Colours4<'_> {
         self.palette.get(usize::from(texel)).copied().unwrap_or(0)
     }
 
-    /// A run in a window of `BYTES` bytes.
+    /// A row of tiles, in windows of `BYTES` bytes.
     #[inline(always)]
     fn window<F: Filter, const WIDTH: u32, const ROWS: u32, const BYTES: usize>(
         &self,
         filter: F,
-        run: Run,
-        tiles: &[Tile],
-        row: u32,
+        tiles: &Tiles<'_>,
         out: &mut [u16],
-        log2: u32,
     ) {
-        let from = usize::from(run.row).wrapping_shl(WIDTH) >> 1;
-        let Some(window) = self.texture.texels.get(from..).and_then(<[u8]>::first_chunk::<BYTES>) else { return };
-        paint_run::<_, WIDTH, ROWS>(filter, tiles, row, out, log2, run.straight != 0, |index| {
+        let window = |row: u16| self.texture.texels.get(usize::from(row).wrapping_shl(WIDTH) >> 1..).and_then(<[u8]>::first_chunk::<BYTES>);
+        paint::<_, _, _, WIDTH, ROWS>(self, filter, tiles, out, window, |window, index| {
             self.entry(window, index & BYTES.wrapping_mul(2).wrapping_sub(1))
         });
     }
@@ -335,19 +322,16 @@ impl Colours for Colours4<'_> {
     }
 
     #[inline(never)]
-    fn run<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
+    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
         &self,
         filter: F,
-        run: Run,
-        tiles: &[Tile],
-        row: u32,
+        tiles: &Tiles<'_>,
         out: &mut [u16],
-        log2: u32,
     ) {
         // Half of TEXELS, which is one of two numbers.
         match TEXELS {
-            0x4000 => self.window::<_, WIDTH, ROWS, 0x2000>(filter, run, tiles, row, out, log2),
-            _ => self.window::<_, WIDTH, ROWS, 0x4000>(filter, run, tiles, row, out, log2),
+            0x4000 => self.window::<_, WIDTH, ROWS, 0x2000>(filter, tiles, out),
+            _ => self.window::<_, WIDTH, ROWS, 0x4000>(filter, tiles, out),
         }
     }
 }
@@ -397,25 +381,21 @@ impl Colours for ColoursDirect<'_> {
     }
 
     #[inline(never)]
-    fn run<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
+    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
         &self,
         filter: F,
-        run: Run,
-        tiles: &[Tile],
-        row: u32,
+        tiles: &Tiles<'_>,
         out: &mut [u16],
-        log2: u32,
     ) {
-        let from = usize::from(run.row).wrapping_shl(WIDTH);
         let texels = self.texture.texels.as_chunks::<2>().0;
-        let Some(window) = texels.get(from..).and_then(<[[u8; 2]]>::first_chunk::<TEXELS>) else { return };
+        let window = |row: u16| texels.get(usize::from(row).wrapping_shl(WIDTH)..).and_then(<[[u8; 2]]>::first_chunk::<TEXELS>);
         // A loop for either order of bytes.
         if self.swapped {
-            paint_run::<_, WIDTH, ROWS>(filter, tiles, row, out, log2, run.straight != 0, |index| {
+            paint::<_, _, _, WIDTH, ROWS>(self, filter, tiles, out, window, |window, index| {
                 pixel::<true>(window.get(index & TEXELS.wrapping_sub(1)))
             });
         } else {
-            paint_run::<_, WIDTH, ROWS>(filter, tiles, row, out, log2, run.straight != 0, |index| {
+            paint::<_, _, _, WIDTH, ROWS>(self, filter, tiles, out, window, |window, index| {
                 pixel::<false>(window.get(index & TEXELS.wrapping_sub(1)))
             });
         }
@@ -470,19 +450,16 @@ impl Colours for AnyColours<'_> {
         }
     }
 
-    fn run<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
+    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
         &self,
         filter: F,
-        run: Run,
-        tiles: &[Tile],
-        row: u32,
+        tiles: &Tiles<'_>,
         out: &mut [u16],
-        log2: u32,
     ) {
         match self {
-            Self::Eight(colours) => colours.run::<F, WIDTH, ROWS, TEXELS>(filter, run, tiles, row, out, log2),
-            Self::Four(colours) => colours.run::<F, WIDTH, ROWS, TEXELS>(filter, run, tiles, row, out, log2),
-            Self::Direct(colours) => colours.run::<F, WIDTH, ROWS, TEXELS>(filter, run, tiles, row, out, log2),
+            Self::Eight(colours) => colours.tiles::<F, WIDTH, ROWS, TEXELS>(filter, tiles, out),
+            Self::Four(colours) => colours.tiles::<F, WIDTH, ROWS, TEXELS>(filter, tiles, out),
+            Self::Direct(colours) => colours.tiles::<F, WIDTH, ROWS, TEXELS>(filter, tiles, out),
         }
     }
 }

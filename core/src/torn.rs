@@ -11,7 +11,7 @@ use crate::site::Site;
 use crate::span::{self, Span};
 use crate::window::{Room, Tile};
 
-/// A block that shows several sheets, or whose positions fit no window, in caller's memory.
+/// A block that is drawn pixel by pixel: its positions fit no window, or its outlines are softened; in caller's memory.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Mixed {
@@ -23,11 +23,9 @@ pub struct Mixed {
     pub along: u16,
     /// Which of the cell's sheets it can show, a bit each; the last of them covers what is left.
     pub sheets: u16,
-    /// How many sides say all about it; none: it is drawn pixel by pixel.
-    pub sides: u16,
 }
 
-/// What a mixed block shows of one sheet, in caller's memory.
+/// What a torn block shows of one sheet, in caller's memory.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Side {
@@ -36,11 +34,7 @@ pub struct Side {
     /// The pixels that show it.
     pub shown: Shown,
     /// The block, from the left.
-    pub block: u16,
-    /// The window's first row.
-    pub row: u16,
-    /// The label.
-    pub label: u32,
+    pub block: u32,
 }
 
 /// Pixels of a block of four or eight pixels: a byte a row, the leftmost pixel lowest, the first row's byte lowest of the first word.
@@ -60,11 +54,13 @@ impl Shown {
     #[inline(always)]
     fn rows(log2: u32, mut row: impl FnMut(u32) -> u32) -> Self {
         let mut words = [0; 2];
-        for next in 0..1u32.wrapping_shl(log2) {
-            // The first row is the last of a word's to be shifted in.
-            let [upper, lower] = &mut words;
-            let word = if next < 4 { upper } else { lower };
-            *word = (*word >> 8) | row(next) << 24;
+        let mut next = 0u32;
+        for word in words.iter_mut().take(if log2 == 2 { 1 } else { 2 }) {
+            for _ in 0..4 {
+                // The first row is shifted furthest.
+                *word = (*word >> 8) | row(next) << 24;
+                next = next.wrapping_add(1);
+            }
         }
         Self(words)
     }
@@ -77,6 +73,24 @@ impl Shown {
         (if row < 4 { upper } else { lower }).wrapping_shr(row.wrapping_mul(8)) & 0xff
     }
 
+    /// How many they are.
+    #[inline(always)]
+    const fn count(self) -> u32 {
+        let [upper, lower] = self.0;
+        upper.count_ones().wrapping_add(lower.count_ones())
+    }
+
+    /// All pixels of row `row`.
+    const fn of(row: u32) -> Self {
+        let bits = 0xffu32.wrapping_shl(row.wrapping_mul(8));
+        if row < 4 { Self([bits, 0]) } else { Self([0, bits]) }
+    }
+
+    const fn or(self, other: Self) -> Self {
+        let (Self([a, b]), Self([c, d])) = (self, other);
+        Self([a | c, b | d])
+    }
+
     const fn and(self, other: Self) -> Self {
         let (Self([a, b]), Self([c, d])) = (self, other);
         Self([a & c, b & d])
@@ -87,51 +101,71 @@ impl Shown {
         Self([a & !c, b & !d])
     }
 
-    /// What lies around all positions of `forms` at these pixels.
+    /// Parts of these pixels of 2^`log2` rows, some rows each, whose positions by `forms` lie in one window each that `room` has, best from row `near` on:
+    /// passed on with the window's first row. `None` where a row lies in no window, or `pass` has had enough.
     #[inline(never)]
-    fn bounds(self, mut forms: [Form; 2], log2: u32) -> Bounds {
-        let mut bounds = Bounds::NOTHING;
+    fn parts(self, mut forms: [Form; 2], log2: u32, (room, near): (&Room, u16), mut pass: impl FnMut(Self, u16) -> Option<()>) -> Option<()> {
+        let (mut part, mut bounds, mut window) = (Self::NONE, Bounds::NOTHING, near);
         for row in 0..1u32.wrapping_shl(log2) {
             let shown = self.row(row);
             if let Some(last) = shown.checked_ilog2() {
                 let first = shown.trailing_zeros();
                 let [u, v] = &forms;
                 let from = [u.from([first, 0]), v.from([first, 0])];
-                bounds = bounds.join(Span::new(&from).bounds(last.wrapping_sub(first).wrapping_add(1)));
+                let here = Span::new(&from).bounds(last.wrapping_sub(first).wrapping_add(1));
+                let all = bounds.join(here);
+                (bounds, window) = match room.row(&all, window) {
+                    Some(window) => (all, window),
+                    None => {
+                        pass(core::mem::take(&mut part), window)?;
+                        (here, room.row(&here, window)?)
+                    }
+                };
+                part = part.or(self.and(Self::of(row)));
             }
             forms.iter_mut().for_each(Form::next_row);
         }
-        bounds
+        pass(part, window)
     }
 }
 
-impl Mixed {
-    /// Works out the block's sides in strip `strip`, for positions that `room` has; how many of the `slots` they take.
-    /// `None` where positions fit no window, or there is no room. The frontmost sheet that covers a pixel shows.
-    #[inline(never)]
-    pub fn share(&self, site: &Site<'_, '_, '_>, strip: u32, room: &Room, slots: &mut [Side]) -> Option<usize> {
-        let log2 = site.block_log2();
-        let offset = site.offset(self.block.into(), strip);
-        let mut left = Shown::all(log2);
-        let (mut sheets, mut sides) = (self.sheets, 0usize);
-        while sheets != 0 && left != Shown::NONE {
-            let place = usize::from(self.sheet).wrapping_add(sheets.trailing_zeros() as usize);
-            sheets &= sheets.wrapping_sub(1);
-            let sheet = &site.sheets.sheet.get(place)?.further(self.along);
-            let cell = site.cell(sheet);
-            let patch = site.block(&cell, offset);
-            let bounds = patch.bounds();
-            let mut shown = left;
-            // The last one covers what is left.
-            if sheets != 0 {
-                let chart = site.chart(sheet);
-                if sheet.test() != CHART {
-                    for which in 0..if chart.strip() { 2 } else { 1 } {
-                        // What is below zero where the field is above.
-                        shown = shown.and(negative(site.field(sheet, which, offset).negated(), log2));
-                    }
-                }
-                if sheet.test() != FIELD && shown != Shown::NONE {
+/// What [`share`] made of a block.
+#[derive(Clone, Copy, Debug)]
+pub struct Share {
+    /// How many sides.
+    pub sides: usize,
+    /// How many sheets were looked at.
+    pub sheets: u32,
+    /// The side that most pixels show, of those whose sheets lie in its window all over the block.
+    pub most: Option<usize>,
+}
+
+/// Works out the sides of block `block`, which is so far from the left upper corner of its torn cell of `sheets`, for positions that `room` has, best in the window
+/// from row `near` on, into `slots`. `None` where positions fit no window, there is no room, or no sheet. The frontmost sheet that covers a pixel shows.
+#[inline(never)]
+pub fn share(site: &Site<'_, '_, '_>, block: u32, offset: [u32; 2], sheets: &[Sheet], (room, near): (&Room, u16), slots: &mut [Side]) -> Option<Share> {
+    let log2 = site.block_log2();
+    let mut share = Share { sides: 0, sheets: 0, most: None };
+    let (mut left, mut pixels) = (Shown::all(log2), 0);
+    let last = sheets.len().min(MAX_SHEETS).checked_sub(1)?;
+    for (place, sheet) in sheets.iter().enumerate().take(MAX_SHEETS) {
+        let chart = site.chart(sheet);
+        // The last one covers what is left.
+        let tested = place < last;
+        let mut shown = left;
+        if tested && sheet.test() != CHART {
+            let fields = if chart.strip() { 2 } else { 1 };
+            if !(0..fields).all(|which| above(site, sheet, which, offset, &mut shown)) {
+                continue;
+            }
+        }
+        let cell = site.cell(sheet);
+        let patch = site.block(&cell, offset);
+        let bounds = patch.bounds();
+        if tested && sheet.test() != FIELD {
+            match chart.cover(&bounds, &site.texture) {
+                Cover::Nothing => continue,
+                Cover::Part if shown != Shown::NONE => {
                     let forms = site.forms(&cell, offset);
                     chart.crossed(&forms, &bounds, |Edge { beyond, upper }| {
                         let near = negative(beyond, log2);
@@ -141,25 +175,59 @@ impl Mixed {
                         shown = masked(shown, forms, log2, &site.texture);
                     }
                 }
-                if shown == Shown::NONE {
-                    continue;
-                }
+                _ => {}
             }
-            left = left.and_not(shown);
-            // What does not show may lie anywhere.
-            let row = room.row(&bounds).or_else(|| room.row(&shown.bounds(site.forms(&cell, offset), log2)))?;
-            *slots.get_mut(sides)? =
-                Side { tile: room.window.tile(&patch, row, log2), shown, block: self.block, row, label: sheet.label().into() };
-            sides = sides.wrapping_add(1);
         }
-        Some(sides)
+        share.sheets = share.sheets.wrapping_add(1);
+        if shown == Shown::NONE {
+            continue;
+        }
+        left = left.and_not(shown);
+        let mut add = |shown: Shown, row: u16| {
+            *slots.get_mut(share.sides)? = Side { tile: room.window.tile(&patch, sheet.label(), row, log2), shown, block };
+            share.sides = share.sides.wrapping_add(1);
+            Some(())
+        };
+        if let Some(row) = room.row(&bounds, near) {
+            let count = shown.count();
+            add(shown, row)?;
+            if count > pixels {
+                (share.most, pixels) = (Some(share.sides.wrapping_sub(1)), count);
+            }
+        } else {
+            // What does not show may lie anywhere.
+            shown.parts(site.forms(&cell, offset), log2, (room, near), add)?;
+        }
+        if left == Shown::NONE {
+            break;
+        }
     }
+    Some(share)
+}
+
+/// Leaves those pixels of a block in `shown` where field `which` of `sheet` is above zero; false where it is nowhere.
+#[inline(always)]
+fn above(site: &Site<'_, '_, '_>, sheet: &Sheet, which: usize, offset: [u32; 2], shown: &mut Shown) -> bool {
+    let cover = field_cover(site.field_corners(sheet, which, offset));
+    if cover == Cover::Part {
+        // What is below zero where the field is above.
+        *shown = shown.and(negative(site.field(sheet, which, offset).negated(), site.block_log2()));
+    }
+    cover != Cover::Nothing
 }
 
 /// At which pixels of a block `form` is below zero.
 // Called from several places, and long.
 #[inline(never)]
 fn negative(mut form: Form, log2: u32) -> Shown {
+    // Most often it bends nowhere: fields never do.
+    if log2 == 3 && form.bend == 0 {
+        return Shown::rows(3, |_| {
+            let row = form.straight_negative();
+            form.next_row();
+            row
+        });
+    }
     Shown::rows(log2, |_| {
         let row = form.negative(1u32.wrapping_shl(log2));
         form.next_row();

@@ -3,6 +3,7 @@
 
 use crate::coverage::Bounds;
 use crate::form::rounded;
+use crate::key::BACKDROP;
 use crate::patch::Patch;
 
 /// A tile, in caller's memory: a patch of a block, as `form::Form` has one, of positions in a window, or differences of such, as
@@ -22,13 +23,45 @@ pub struct Tile {
     pub turn: u32,
     /// and from pixel to pixel.
     pub bend: u32,
+    /// The window's first row.
+    pub row: u16,
+    /// What shows there.
+    pub label: u8,
+    /// How many tiles there are in the window from this one on, if it is the first.
+    pub run: u8,
 }
 
 /// The pixels of a tile's row: where the first is, how far it is to the next, and how that changes.
 pub type Line = [u32; 3];
 
 impl Tile {
-    /// The sum of two, of a lane each.
+    /// One that shows nothing: its block is drawn in another way.
+    pub const NONE: Self = Self { at: 0, down: 0, fall: 0, step: 0, turn: 0, bend: 0, row: u16::MAX, label: 0, run: 1 };
+    /// One that shows the backdrop's one colour.
+    pub const PLAIN: Self = Self { row: u16::MAX - 1, label: BACKDROP as u8, ..Self::NONE };
+
+    /// It shows the backdrop's one colour.
+    #[must_use]
+    #[inline(always)]
+    pub const fn is_plain(&self) -> bool {
+        self.row == Self::PLAIN.row
+    }
+
+    /// It is in a window.
+    #[must_use]
+    #[inline(always)]
+    pub const fn in_window(&self) -> bool {
+        self.row < Self::PLAIN.row
+    }
+
+    /// The same of `label`, in the window from `row` on.
+    #[must_use]
+    #[inline(always)]
+    pub const fn of(self, label: u8, row: u16) -> Self {
+        Self { row, label, ..self }
+    }
+
+    /// The sum of two, of a lane each; of the label and in the window of the first.
     #[must_use]
     #[inline(always)]
     pub const fn plus(&self, other: &Self) -> Self {
@@ -39,6 +72,7 @@ impl Tile {
             step: self.step.wrapping_add(other.step),
             turn: self.turn.wrapping_add(other.turn),
             bend: self.bend.wrapping_add(other.bend),
+            ..*self
         }
     }
 
@@ -47,7 +81,7 @@ impl Tile {
     #[must_use]
     #[inline(always)]
     pub const fn from_middle(self, log2: u32) -> Self {
-        let Self { at, down, fall, step, turn, bend } = self;
+        let Self { at, down, fall, step, turn, bend, .. } = self;
         let half = 1u32.wrapping_shl(log2) >> 1;
         let curves = bend.wrapping_add(fall).wrapping_mul(half.wrapping_mul(half.wrapping_add(1)) >> 1);
         let steps = step.wrapping_add(down).wrapping_sub(half.wrapping_mul(turn)).wrapping_mul(half);
@@ -115,14 +149,15 @@ impl Window {
         (rounded(x, 16u32.wrapping_add(bits).wrapping_add(self.width_log2).wrapping_sub(32).wrapping_add(log2)) as u32).wrapping_shl(bits)
     }
 
-    /// The tile of `patch`, 2^`log2` pixels wide and high, in a window from `row` on.
+    /// The tile of `patch`, which shows `label`, 2^`log2` pixels wide and high, in a window from `row` on.
     #[must_use]
     #[inline(always)]
-    pub fn tile(self, patch: &Patch, row: u16, log2: u32) -> Tile {
-        match (self, log2) {
+    pub fn tile(self, patch: &Patch, label: u8, row: u16, log2: u32) -> Tile {
+        let tile = match (self, log2) {
             (Self::USUAL, 3) => Self::USUAL.packed(patch, row, 3),
             _ => self.any_tile(patch, row, log2),
-        }
+        };
+        tile.of(label, row)
     }
 
     #[inline(never)]
@@ -133,7 +168,9 @@ impl Window {
     /// [`Window::tile`], written out where the window and `log2` are known.
     #[inline(always)]
     pub fn packed(self, patch: &Patch, row: u16, log2: u32) -> Tile {
-        let [u, v] = patch.axes().map(|(corners, sums)| Middle::new(corners, sums, log2));
+        // Each by name: a map over both would be a call.
+        let [(corners, sums), (corners_v, sums_v)] = patch.axes();
+        let (u, v) = (Middle::new(corners, sums, log2), Middle::new(corners_v, sums_v, log2));
         let first = i32::from(row).wrapping_shl(16);
         let v = v.plus(first.wrapping_neg()).lanes(log2, |x, log2| self.lane::<true>(x, log2));
         v.plus(&u.lanes(log2, |x, log2| self.lane::<false>(x, log2))).from_middle(log2)
@@ -215,7 +252,7 @@ impl Middle {
         let twice = log2.wrapping_mul(2);
         let [step, down] = [self.step, self.down].map(|step| lane(step, log2.wrapping_add(1)));
         let [bend, fall] = [self.bend, self.fall].map(|change| lane(change, twice.wrapping_add(2)));
-        Tile { at: lane(self.at, 0), down, fall, step, turn: lane(self.turn, twice), bend }
+        Tile { at: lane(self.at, 0), down, fall, step, turn: lane(self.turn, twice), bend, ..Tile::default() }
     }
 }
 
@@ -245,47 +282,37 @@ impl Room {
         Some(Self { window, margin, right, end, last })
     }
 
-    /// Whether it has what lies within `bounds`, in the window from `row` on.
+    /// The first row of a window that holds what lies within `bounds`: `near` if that does, else one that begins there, as far as the picture goes; `None`
+    /// where there is no such.
     #[must_use]
     #[inline(always)]
-    pub const fn holds(&self, &Bounds { low, high }: &Bounds, row: u16) -> bool {
-        let first = (row as i32).wrapping_shl(16);
-        low.u >= self.margin && high.u < self.right && low.v.wrapping_sub(first) >= self.margin && high.v.wrapping_sub(first) < self.end
-    }
-
-    /// The first row of a window that holds `patch` and begins or ends there, `more` before or after it, so that it has room where a run is heading;
-    /// `None` where there is no such.
-    #[must_use]
-    #[inline]
-    pub fn onwards(&self, patch: &Patch, more: i32) -> Option<u16> {
-        let [a, b, c, d] = patch.corners;
-        let bounds = patch.bounds();
-        let row = if b.v.wrapping_add(d.v) >= a.v.wrapping_add(c.v) {
-            bounds.low.v.wrapping_sub(self.margin).wrapping_sub(more) >> 16
-        } else {
-            self.first_to(bounds.high.v.wrapping_add(more))
+    pub fn row(&self, bounds: &Bounds, near: u16) -> Option<u16> {
+        let &Bounds { low, high } = bounds;
+        if low.u < self.margin || high.u >= self.right {
+            return None;
+        }
+        let holds = |row: i32| {
+            let first = row.wrapping_shl(16);
+            low.v.wrapping_sub(first) >= self.margin && high.v.wrapping_sub(first) < self.end
         };
-        self.held(&bounds, row)
+        if holds(near.into()) {
+            return Some(near);
+        }
+        let row = self.first(low.v, self.margin);
+        if holds(row) { Some(row as u16) } else { None }
     }
 
-    /// The first row of a window that ends where `high` does.
+    /// The first row of a window that begins `margin` above `low`, as far as the picture goes.
     #[inline(always)]
-    const fn first_to(&self, high: i32) -> i32 {
-        (high.wrapping_add(self.margin) >> 16).wrapping_add(1).wrapping_sub(1i32.wrapping_shl(self.window.rows_log2))
+    pub fn first(&self, low: i32, margin: i32) -> i32 {
+        (low.wrapping_sub(margin) >> 16).min(self.last).max(0)
     }
 
-    /// The first row of a window that holds what lies within `bounds` and begins there; `None` where there is no such.
-    #[must_use]
+    /// Of one that ends as far below `high`.
     #[inline(always)]
-    pub fn row(&self, bounds: &Bounds) -> Option<u16> {
-        self.held(bounds, bounds.low.v.wrapping_sub(self.margin) >> 16)
-    }
-
-    /// The row of the picture that comes closest to `row`, if the window from there on holds what lies within `bounds`.
-    #[inline(always)]
-    fn held(&self, bounds: &Bounds, row: i32) -> Option<u16> {
-        let row = row.min(self.last).max(0) as u16;
-        Some(row).filter(|&row| self.holds(bounds, row))
+    pub fn first_to(&self, high: i32, margin: i32) -> i32 {
+        let rows = 1i32.wrapping_shl(self.window.rows_log2);
+        (high.wrapping_add(margin) >> 16).wrapping_add(1).wrapping_sub(rows).min(self.last).max(0)
     }
 }
 
