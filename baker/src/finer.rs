@@ -114,10 +114,21 @@ mod tests {
 
     #[test]
     fn pictures_that_come_out_right_keep_their_cells() {
-        let (scene, flat, coarse) = made("cone-orbit", [160, 120], 65, Settings::default());
+        let settings = Settings { key_interval: 16, ..Settings::default() };
+        let (scene, flat, coarse) = made("cone-orbit", [160, 120], 65, settings);
         let bytes = coarse.encoded.bundle.clone();
         let (kept, other) = choose(&scene, &flat, coarse, &|_, _| {}).unwrap();
-        assert_eq!((kept.settings.cell, kept.encoded.bundle == bytes, other.is_none()), (Settings::default().cell, true, true));
+        assert_eq!((kept.settings.cell, kept.encoded.bundle == bytes, other.is_none()), (settings.cell, true, true));
+    }
+
+    #[test]
+    fn slow_paths_get_farther_keys() {
+        let (scene, flat, usual) = made("cone-orbit", [160, 120], 65, Settings::default());
+        let picture = usual.picture(&flat);
+        let (before, bytes) = (usual.worth(picture), usual.encoded.bundle.len());
+        let (kept, other) = choose(&scene, &flat, usual, &|_, _| {}).unwrap();
+        assert_eq!((kept.settings.cell, kept.settings.key_interval, other.is_some()), (8, 16, true));
+        assert!(kept.worth(picture) > before && kept.encoded.bundle.len() < bytes);
     }
 
     #[test]
@@ -163,8 +174,9 @@ mod tests {
             climbs(cell, &Quality { wrong_surface_percent, path_error_texels, ..Quality::default() })
                 .map(|(climbs, why)| (climbs.len(), why.split(' ').next().unwrap()))
         };
-        // Torn and steady, torn and not quite so, both torn and bent, the last in large cells; bent; neither.
+        // Torn and steady, torn and not quite so, both torn and bent, the last in large cells; bent; neither; steady.
         assert_eq!([tried(8, 2.0, 0.9), tried(8, 2.0, 1.0), tried(8, 2.0, 2.0)], [Some((2, "many")), Some((1, "many")), None]);
         assert_eq!([tried(16, 2.0, 2.0), tried(8, 1.9, 2.0), tried(8, 1.9, 1.9)], [Some((2, "many")), Some((1, "surfaces")), None]);
+        assert_eq!(tried(8, 1.9, 0.9), Some((1, "surfaces")));
     }
 }

@@ -9,7 +9,7 @@ use crate::fixed::PlayUv;
 use crate::row::{Layer, Place};
 use crate::sheet::{Sheet, Stretch};
 use crate::site::Site;
-use crate::torn::{self, Mixed, Side};
+use crate::torn::{self, Mixed, Shown, Side};
 use crate::window::{self, Middle, Room, Tile, Window};
 use core::slice;
 
@@ -197,14 +197,13 @@ impl Plan<'_> {
     /// Makes side `side` the tile of its block, drawn all over it before the other sides are drawn over that; none: it has only sides.
     #[inline(always)]
     fn base(&mut self, site: &Site<'_, '_, '_>, side: Option<usize>) {
-        let sides = self.side.get_mut(..self.sides).unwrap_or(&mut []);
-        let (Some(side), Some((last, others))) = (side, sides.split_last_mut()) else { return self.put(Tile::NONE) };
-        let mut tile = last.tile;
-        // The last one takes its place.
-        if let Some(slot) = others.get_mut(side) {
-            (tile, *slot) = (slot.tile, *last);
+        let Some(most) = side.and_then(|side| self.side.get_mut(side)) else { return self.put(Tile::NONE) };
+        let tile = most.tile;
+        most.shown = Shown::NONE;
+        // Seldom it is none of the last ones: to move others would take longer than to pass it by.
+        if side == Some(self.sides.wrapping_sub(1)) {
+            self.sides = self.sides.wrapping_sub(1);
         }
-        self.sides = others.len();
         if site.plain(tile.label) { self.plain(1) } else { self.put(tile) }
     }
 
@@ -258,14 +257,14 @@ impl Cells<'_> {
         self.room.margin.wrapping_add(BULGE)
     }
 
-    /// The first row of a window for the cell whose v are these at its corners, one that has room where they are heading.
+    /// The first row of a window for the cell whose v are these at its corners, one that has room where they are heading; `None` where none holds it.
     #[inline(never)]
-    fn window(&self, [a, b, c, d]: [i32; 4]) -> i32 {
-        if b.wrapping_add(d) >= a.wrapping_add(c) {
-            self.room.first(a.min(c).min(b.min(d)), self.margin())
-        } else {
-            self.room.first_to(a.max(c).max(b.max(d)), self.margin())
-        }
+    fn window(&self, [a, b, c, d]: [i32; 4]) -> Option<i32> {
+        let (low, high) = (a.min(c).min(b.min(d)), a.max(c).max(b.max(d)));
+        let margin = self.margin();
+        let rising = b.wrapping_add(d) >= a.wrapping_add(c);
+        let row = if rising { self.room.first(low, margin) } else { self.room.first_to(high, margin) };
+        Some(row).filter(|&row| self.room.holds(low, high, row, margin))
     }
 
     /// The tiles of the cell that has these numbers at its corners, and these sums of second differences; `lane`: theirs.
@@ -309,17 +308,17 @@ fn lay_down<const TILES: usize, T: Place>(
     let mut edges = above.iter().zip(below);
     let Some((above, below)) = edges.next() else { return 0 };
     let ([mut a, mut c], mut left) = ([v(above.layer()), v(below.layer())], sums(above, below, v));
-    let mut held = inside(a, row) && inside(c, row);
+    if !(inside(a, row) && inside(c, row)) {
+        // A window that holds nothing: the first cell finds its own.
+        row = 1 << 14;
+    }
     let mut done = 0usize;
     for (slots, (above, below)) in slots.iter_mut().zip(edges) {
         let ([b, d], right) = ([v(above.layer()), v(below.layer())], sums(above, below, v));
         let all = [left[0].wrapping_add(right[0]), left[1].wrapping_add(right[1])];
-        if !(held && inside(b, row) && inside(d, row)) {
-            row = cells.window([a, b, c, d]);
-            if ![a, b, c, d].into_iter().all(|v| inside(v, row)) {
-                break;
-            }
-            held = true;
+        if !(inside(b, row) && inside(d, row)) {
+            let Some(other) = cells.window([a, b, c, d]) else { break };
+            row = other;
         }
         if bulges(all) {
             break;

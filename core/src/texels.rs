@@ -160,12 +160,7 @@ trait Colours {
     fn colour(&self, index: usize) -> u16;
 
     /// A row of tiles, as [`Paint::tiles`] has it.
-    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
-        &self,
-        filter: F,
-        tiles: &Tiles<'_>,
-        out: &mut [u16],
-    );
+    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, filter: F, tiles: &Tiles<'_>, out: &mut [u16]);
 }
 
 /// Colours looked up by way of a filter.
@@ -226,12 +221,7 @@ impl Colours for Colours8<'_> {
 
     // A function of its own: the loop needs all registers.
     #[inline(never)]
-    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
-        &self,
-        filter: F,
-        tiles: &Tiles<'_>,
-        out: &mut [u16],
-    ) {
+    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, filter: F, tiles: &Tiles<'_>, out: &mut [u16]) {
         // The plan keeps windows inside the picture.
         let window = |row: u16| self.texture.texels.get(usize::from(row).wrapping_shl(WIDTH)..).and_then(<[u8]>::first_chunk::<TEXELS>);
         paint::<_, _, _, WIDTH, ROWS>(self, filter, tiles, out, window, |window, index| {
@@ -296,12 +286,7 @@ impl Colours4<'_> {
 
     /// A row of tiles, in windows of `BYTES` bytes.
     #[inline(always)]
-    fn window<F: Filter, const WIDTH: u32, const ROWS: u32, const BYTES: usize>(
-        &self,
-        filter: F,
-        tiles: &Tiles<'_>,
-        out: &mut [u16],
-    ) {
+    fn window<F: Filter, const WIDTH: u32, const ROWS: u32, const BYTES: usize>(&self, filter: F, tiles: &Tiles<'_>, out: &mut [u16]) {
         let window = |row: u16| self.texture.texels.get(usize::from(row).wrapping_shl(WIDTH) >> 1..).and_then(<[u8]>::first_chunk::<BYTES>);
         paint::<_, _, _, WIDTH, ROWS>(self, filter, tiles, out, window, |window, index| {
             self.entry(window, index & BYTES.wrapping_mul(2).wrapping_sub(1))
@@ -322,12 +307,7 @@ impl Colours for Colours4<'_> {
     }
 
     #[inline(never)]
-    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
-        &self,
-        filter: F,
-        tiles: &Tiles<'_>,
-        out: &mut [u16],
-    ) {
+    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, filter: F, tiles: &Tiles<'_>, out: &mut [u16]) {
         // Half of TEXELS, which is one of two numbers.
         match TEXELS {
             0x4000 => self.window::<_, WIDTH, ROWS, 0x2000>(filter, tiles, out),
@@ -381,12 +361,7 @@ impl Colours for ColoursDirect<'_> {
     }
 
     #[inline(never)]
-    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
-        &self,
-        filter: F,
-        tiles: &Tiles<'_>,
-        out: &mut [u16],
-    ) {
+    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, filter: F, tiles: &Tiles<'_>, out: &mut [u16]) {
         let texels = self.texture.texels.as_chunks::<2>().0;
         let window = |row: u16| texels.get(usize::from(row).wrapping_shl(WIDTH)..).and_then(<[[u8; 2]]>::first_chunk::<TEXELS>);
         // A loop for either order of bytes.
@@ -450,12 +425,7 @@ impl Colours for AnyColours<'_> {
         }
     }
 
-    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
-        &self,
-        filter: F,
-        tiles: &Tiles<'_>,
-        out: &mut [u16],
-    ) {
+    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, filter: F, tiles: &Tiles<'_>, out: &mut [u16]) {
         match self {
             Self::Eight(colours) => colours.tiles::<F, WIDTH, ROWS, TEXELS>(filter, tiles, out),
             Self::Four(colours) => colours.tiles::<F, WIDTH, ROWS, TEXELS>(filter, tiles, out),

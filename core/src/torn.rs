@@ -43,7 +43,8 @@ pub struct Side {
 pub struct Shown([u32; 2]);
 
 impl Shown {
-    const NONE: Self = Self([0; 2]);
+    /// None.
+    pub const NONE: Self = Self([0; 2]);
 
     /// All pixels of a block of 2^`log2`.
     const fn all(log2: u32) -> Self {
@@ -53,16 +54,13 @@ impl Shown {
     /// Those that `row` has in each row of a block of 2^`log2`.
     #[inline(always)]
     fn rows(log2: u32, mut row: impl FnMut(u32) -> u32) -> Self {
-        let mut words = [0; 2];
-        let mut next = 0u32;
-        for word in words.iter_mut().take(if log2 == 2 { 1 } else { 2 }) {
-            for _ in 0..4 {
-                // The first row is shifted furthest.
-                *word = (*word >> 8) | row(next) << 24;
-                next = next.wrapping_add(1);
-            }
+        let [mut upper, mut lower] = [0u32; 2];
+        for next in 0..1u32.wrapping_shl(log2) {
+            // The first row is shifted furthest.
+            let made = row(next);
+            (upper, lower) = ((upper >> 8) | lower << 24, (lower >> 8) | made << 24);
         }
-        Self(words)
+        Self(if log2 == 2 { [lower, 0] } else { [upper, lower] })
     }
 
     /// The pixels of row `row`, a bit each.
@@ -104,7 +102,13 @@ impl Shown {
     /// Parts of these pixels of 2^`log2` rows, some rows each, whose positions by `forms` lie in one window each that `room` has, best from row `near` on:
     /// passed on with the window's first row. `None` where a row lies in no window, or `pass` has had enough.
     #[inline(never)]
-    fn parts(self, mut forms: [Form; 2], log2: u32, (room, near): (&Room, u16), mut pass: impl FnMut(Self, u16) -> Option<()>) -> Option<()> {
+    fn parts(
+        self,
+        mut forms: [Form; 2],
+        log2: u32,
+        (room, near): (&Room, u16),
+        mut pass: impl FnMut(Self, u16) -> Option<()>,
+    ) -> Option<()> {
         let (mut part, mut bounds, mut window) = (Self::NONE, Bounds::NOTHING, near);
         for row in 0..1u32.wrapping_shl(log2) {
             let shown = self.row(row);
@@ -143,7 +147,14 @@ pub struct Share {
 /// Works out the sides of block `block`, which is so far from the left upper corner of its torn cell of `sheets`, for positions that `room` has, best in the window
 /// from row `near` on, into `slots`. `None` where positions fit no window, there is no room, or no sheet. The frontmost sheet that covers a pixel shows.
 #[inline(never)]
-pub fn share(site: &Site<'_, '_, '_>, block: u32, offset: [u32; 2], sheets: &[Sheet], (room, near): (&Room, u16), slots: &mut [Side]) -> Option<Share> {
+pub fn share(
+    site: &Site<'_, '_, '_>,
+    block: u32,
+    offset: [u32; 2],
+    sheets: &[Sheet],
+    (room, near): (&Room, u16),
+    slots: &mut [Side],
+) -> Option<Share> {
     let log2 = site.block_log2();
     let mut share = Share { sides: 0, sheets: 0, most: None };
     let (mut left, mut pixels) = (Shown::all(log2), 0);
@@ -222,7 +233,7 @@ fn above(site: &Site<'_, '_, '_>, sheet: &Sheet, which: usize, offset: [u32; 2],
 fn negative(mut form: Form, log2: u32) -> Shown {
     // Most often it bends nowhere: fields never do.
     if log2 == 3 && form.bend == 0 {
-        return Shown::rows(3, |_| {
+        return Shown::rows(log2, |_| {
             let row = form.straight_negative();
             form.next_row();
             row

@@ -265,8 +265,6 @@ pub struct Room {
     pub margin: i32,
     /// What u is below.
     right: i32,
-    /// What v is below, from the window's first row on.
-    end: i32,
     /// The last window's first row, in the picture.
     last: i32,
 }
@@ -277,9 +275,8 @@ impl Room {
     pub const fn new(width_log2: u32, height: u32, margin: i32) -> Option<Self> {
         let Some(window) = Window::new(width_log2, height) else { return None };
         let right = 1i32.wrapping_shl(window.width_log2.wrapping_add(16)).wrapping_sub(margin);
-        let end = 1i32.wrapping_shl(window.rows_log2.wrapping_add(16)).wrapping_sub(margin);
         let last = height.wrapping_sub(1u32.wrapping_shl(window.rows_log2)) as i32;
-        Some(Self { window, margin, right, end, last })
+        Some(Self { window, margin, right, last })
     }
 
     /// The first row of a window that holds what lies within `bounds`: `near` if that does, else one that begins there, as far as the picture goes; `None`
@@ -291,15 +288,19 @@ impl Room {
         if low.u < self.margin || high.u >= self.right {
             return None;
         }
-        let holds = |row: i32| {
-            let first = row.wrapping_shl(16);
-            low.v.wrapping_sub(first) >= self.margin && high.v.wrapping_sub(first) < self.end
-        };
+        let holds = |row: i32| self.holds(low.v, high.v, row, self.margin);
         if holds(near.into()) {
             return Some(near);
         }
         let row = self.first(low.v, self.margin);
         if holds(row) { Some(row as u16) } else { None }
+    }
+
+    /// Whether the window from `row` on holds what is between `low` and `high`, `margin` inside it. Q16 texels.
+    #[inline(always)]
+    pub const fn holds(&self, low: i32, high: i32, row: i32, margin: i32) -> bool {
+        let (first, rows) = (row.wrapping_shl(16), 1i32.wrapping_shl(self.window.rows_log2.wrapping_add(16)));
+        low.wrapping_sub(first) >= margin && high.wrapping_sub(first) < rows.wrapping_sub(margin)
     }
 
     /// The first row of a window that begins `margin` above `low`, as far as the picture goes.
