@@ -6,6 +6,7 @@ use crate::atlas::Texture;
 use crate::fixed::{PLAY_BITS, PlayUv};
 use crate::form::Form;
 use crate::format::{LabelRecord, MASKED, STRIP};
+use core::ops::Range;
 
 /// How much of something a sheet covers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,11 +56,11 @@ impl Chart {
         Self { left: edge(left), top: edge(top), right: edge(right), bottom: edge(bottom), flags: flags.into() }
     }
 
-    /// The label's outline is told by two fields.
+    /// The fields that tell the label's outline: one, or two of a strip.
     #[must_use]
     #[inline]
-    pub const fn strip(&self) -> bool {
-        self.flags & STRIP as u32 != 0
+    pub const fn fields(&self) -> Range<usize> {
+        0..if self.flags & STRIP as u32 != 0 { 2 } else { 1 }
     }
 
     /// The chart does not fill its rectangle: the mask says where it is.

@@ -263,7 +263,7 @@ fn block<P: Paint>(site: &Site<'_, '_, '_>, mixed: Mixed, y: u32, pixels: &mut [
         // The last one covers what is left.
         let tested = sheets != 0;
         if tested && sheet.test() != CHART {
-            for which in 0..if chart.strip() { 2 } else { 1 } {
+            for which in chart.fields() {
                 // Below zero where the field is above.
                 shown &= beside(site.field(sheet, which, offset)).negated().negative(wide);
             }

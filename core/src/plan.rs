@@ -97,7 +97,7 @@ impl Plan<'_> {
             along = stretch.cells;
         }
         while along < stretch.cells && across.left < across.width {
-            // In pictures 512 and 256 wide, as most are, and cells of eight or sixteen pixels; others go by `append` alone. Likewise the cell that the
+            // In pictures 512, 256 and 128 wide, as most are, and cells of eight or sixteen pixels; others go by `append` alone. Likewise the cell that the
             // screen's edge cuts.
             let most =
                 across.width.saturating_sub(across.left).wrapping_shr(across.site.log2()).min(stretch.cells.wrapping_sub(along).into());
@@ -140,11 +140,13 @@ impl Plan<'_> {
         let flat = [top.layer.get(above..).unwrap_or(&[]), bottom.layer.get(below..).unwrap_or(&[])];
         // What most bundles are made of has code of its own.
         match (room.window, across.site.log2(), across.site.straight()) {
-            (Window::USUAL, 3, false) => self.grow::<9, 1, _>(&cells, bends),
-            (Window::NARROW, 3, false) => self.grow::<8, 1, _>(&cells, bends),
-            (Window::USUAL, 4, false) => self.grow::<9, 2, _>(&cells, bends),
-            (Window::USUAL, 3, true) => self.grow::<9, 1, _>(&cells, flat),
-            (Window::USUAL, 4, true) => self.grow::<9, 2, _>(&cells, flat),
+            (Window::USUAL, 3, false) => self.grow::<9, 6, 1, _>(&cells, bends),
+            (Window::USUAL, 3, true) => self.grow::<9, 6, 1, _>(&cells, flat),
+            (Window::USUAL, 4, false) => self.grow::<9, 6, 2, _>(&cells, bends),
+            (Window::USUAL, 4, true) => self.grow::<9, 6, 2, _>(&cells, flat),
+            (Window::NARROW, 3, false) => self.grow::<8, 6, 1, _>(&cells, bends),
+            (Window::SMALL, 3, false) => self.grow::<7, 7, 1, _>(&cells, bends),
+            (Window::SMALL, 3, true) => self.grow::<7, 7, 1, _>(&cells, flat),
             _ => 0,
         }
     }
@@ -152,10 +154,10 @@ impl Plan<'_> {
     /// Appends tiles of `cells` of so many `TILES` a row of blocks, as long as each fits a window; returns of how many. The `lines` above and below start
     /// at their left corners.
     #[inline(never)]
-    fn grow<const WIDTH: u32, const TILES: usize, T: Place>(&mut self, cells: &Cells<'_>, lines: [&[T]; 2]) -> u16 {
+    fn grow<const WIDTH: u32, const ROWS: u32, const TILES: usize, T: Place>(&mut self, cells: &Cells<'_>, lines: [&[T]; 2]) -> u16 {
         let Some(slots) = self.tile.get_mut(self.tiles..).map(|slots| slots.as_chunks_mut::<TILES>().0) else { return 0 };
         let Some(slots) = slots.get_mut(..cells.most) else { return 0 };
-        let window = Window { width_log2: WIDTH, ..Window::USUAL };
+        let window = Window { width_log2: WIDTH, rows_log2: ROWS };
         // An axis after the other: what is known of both at a time would not fit a small processor's registers.
         let done = lay_down::<TILES, T>(slots, lines, cells, window);
         let done = lay_across::<TILES, T>(slots.get_mut(..done).unwrap_or(&mut []), lines, cells, window);
@@ -164,8 +166,8 @@ impl Plan<'_> {
         done as u16
     }
 
-    /// Plans the block at `across`, of a cell of `sheets`: by sides, the one that most pixels show as a tile of a run; where it has none, pixel by pixel,
-    /// as `mixed` says.
+    /// Plans the block at `across`, of a cell of `sheets`: by sides, of which the one that most pixels show becomes its tile; where it has none, pixel by
+    /// pixel, as `mixed` says.
     fn block(&mut self, across: &Across<'_, '_, '_>, sheets: &[Sheet], mixed: Mixed) {
         let (site, offset) = (across.site, across.offset());
         let tests = |sheets: u32| {

@@ -199,7 +199,7 @@ impl<'k> Beside<'k> {
 }
 
 /// A chain of a row at one moment, and the chains it comes from at both ends of the interval.
-struct Stretch<'k> {
+struct Between<'k> {
     chain: Chain,
     start: &'k Chain,
     end: &'k Chain,
@@ -207,7 +207,7 @@ struct Stretch<'k> {
     row: usize,
 }
 
-impl Stretch<'_> {
+impl Between<'_> {
     /// Fills in the chain's layers.
     #[inline(always)]
     fn fill<'k, T: Place>(&self, layers: &mut [T], keys: &Around<'k, '_>, moment: &Moment, beside: [&mut Beside<'k>; 2]) {
@@ -323,7 +323,7 @@ impl NodeRow<'_> {
             while let Some(end) = to.from(start.label, column).filter(|end| end.first < start.end) {
                 let (first, stop) = (column.max(end.first), start.end.min(end.end));
                 let Some(chain) = self.open(start.label, first, stop, count) else { return count as u32 };
-                let place = Stretch { chain, start, end, grid, row };
+                let place = Between { chain, start, end, grid, row };
                 if self.node.is_empty() {
                     place.fill(self.layer, keys, moment, [&mut before, &mut after]);
                 } else {

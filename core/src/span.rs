@@ -1,5 +1,5 @@
-//! Spans: the inner loops. Pixels of a row are made from positions that step along it: in runs of blocks that show one sheet each, or
-//! block by block where several sheets take turns. What is where comes from `plan`; pixels go to the caller's row.
+//! Spans: the inner loops. Pixels of a row are made from positions that step along it: tile by tile, or those of a tile that show. What is where comes
+//! from `plan`; pixels go to the caller's row.
 
 use crate::atlas::Texture;
 use crate::coverage::{Bounds, Chart, Cover};

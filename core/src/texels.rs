@@ -243,9 +243,9 @@ fn paint<C: Colours, F: Filter, W: Copy, const WIDTH: u32, const ROWS: u32>(
     let at = |uv, x| filter.at(uv, x, colours.texture(), |index| colours.colour(index));
     let offsets = filter.offsets(WIDTH);
     let make = |window: W, at: Packed<WIDTH, ROWS>| filter.packed(at, |index| colour(window, index));
-    // Cells of four pixels are rare, and most pictures 512 texels wide.
+    // Cells of four pixels are rare; most pictures are 512 texels wide, and those of models 128.
     match (tiles.log2, WIDTH, tiles.straight) {
-        (3, 9, true) => tiles.paint::<_, W, WIDTH, ROWS, 8, false>(out, offsets, window, make, at),
+        (3, 7 | 9, true) => tiles.paint::<_, W, WIDTH, ROWS, 8, false>(out, offsets, window, make, at),
         (3, ..) => tiles.paint::<_, W, WIDTH, ROWS, 8, true>(out, offsets, window, make, at),
         _ => tiles.paint::<_, W, WIDTH, ROWS, 4, true>(out, offsets, window, make, at),
     }

@@ -165,8 +165,7 @@ pub fn share(
         let tested = place < last;
         let mut shown = left;
         if tested && sheet.test() != CHART {
-            let fields = if chart.strip() { 2 } else { 1 };
-            if !(0..fields).all(|which| above(site, sheet, which, offset, &mut shown)) {
+            if !chart.fields().all(|which| above(site, sheet, which, offset, &mut shown)) {
                 continue;
             }
         }
@@ -269,7 +268,7 @@ pub fn candidates(site: &Site<'_, '_, '_>, offset: [u32; 2], sheets: &[Sheet]) -
         let Some(chart) = site.charts.get(usize::from(sheet.label())) else { break };
         let mut cover = Cover::All;
         if sheet.test() != CHART {
-            for which in 0..if chart.strip() { 2 } else { 1 } {
+            for which in chart.fields() {
                 cover = cover.and(field_cover(site.field_corners(sheet, which, offset)));
             }
         }

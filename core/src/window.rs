@@ -120,8 +120,10 @@ pub struct Window {
 impl Window {
     /// That of pictures 512 texels wide, as most are: what is made for it has code of its own.
     pub const USUAL: Self = Self { width_log2: 9, rows_log2: 6 };
-    /// That of pictures 256 texels wide.
+    /// That of pictures 256 texels wide,
     pub const NARROW: Self = Self { width_log2: 8, rows_log2: 6 };
+    /// and of those 128 texels wide, as models alone have.
+    pub const SMALL: Self = Self { width_log2: 7, rows_log2: 7 };
 
     /// The window for pictures 2^`width_log2` texels wide and `height` high: the fraction bits are shared out so that a texel
     /// has at least 256 steps.
@@ -155,6 +157,7 @@ impl Window {
     pub fn tile(self, patch: &Patch, label: u8, row: u16, log2: u32) -> Tile {
         let tile = match (self, log2) {
             (Self::USUAL, 3) => Self::USUAL.packed(patch, row, 3),
+            (Self::SMALL, 3) => Self::SMALL.packed(patch, row, 3),
             _ => self.any_tile(patch, row, log2),
         };
         tile.of(label, row)
