@@ -50,13 +50,14 @@ fn climbs(cell: u32, quality: &Quality) -> Option<(&'static [Climb], &'static st
     // Smaller cells are there for the picture: keys still farther apart would take that back.
     const FINER: Climb = (&[Step::FINER], 1);
     const FARTHER: Climb = (&[Step::DOUBLE], 1);
+    const FAR: Climb = (&[Step::DOUBLE], 2);
     const CLOSER: Climb = (&[Step::COARSER, Step::HALF], BENT_TRIES);
     let (torn, bent) = (quality.wrong_surface_percent >= TORN, quality.path_error_texels.p99);
     let climbs: &[Climb] = match torn {
         true if bent < STEADY || cell > USUAL => &[FINER, FARTHER],
         true if bent < BENT => &[FARTHER],
         false if bent >= BENT => &[CLOSER],
-        false if bent < STEADY => &[FARTHER],
+        false if bent < STEADY => &[FAR],
         _ => return None,
     };
     let why = match torn {

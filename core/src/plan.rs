@@ -10,7 +10,7 @@ use crate::row::{Layer, Place};
 use crate::sheet::{Sheet, Stretch};
 use crate::site::Site;
 use crate::torn::{self, Mixed, Shown, Side};
-use crate::window::{self, Middle, Room, Tile, Window};
+use crate::window::{self, Middle, Room, Tile};
 use core::slice;
 
 /// A strip's blocks, in caller's memory.
@@ -97,8 +97,7 @@ impl Plan<'_> {
             along = stretch.cells;
         }
         while along < stretch.cells && across.left < across.width {
-            // In pictures 512, 256 and 128 wide, as most are, and cells of eight or sixteen pixels; others go by `append` alone. Likewise the cell that the
-            // screen's edge cuts.
+            // Cells of eight or sixteen pixels; others go by `append` alone. Likewise the cell that the screen's edge cuts.
             let most =
                 across.width.saturating_sub(across.left).wrapping_shr(across.site.log2()).min(stretch.cells.wrapping_sub(along).into());
             let more = if most > 0 { self.extend(across, sheet, along, most as usize) } else { 0 };
@@ -138,29 +137,25 @@ impl Plan<'_> {
         let cells = Cells { room, label: sheet.label(), low: across.offset()[1] > 0, most, near: self.near };
         let bends = [top.node.get(above..).unwrap_or(&[]), bottom.node.get(below..).unwrap_or(&[])];
         let flat = [top.layer.get(above..).unwrap_or(&[]), bottom.layer.get(below..).unwrap_or(&[])];
-        // What most bundles are made of has code of its own.
-        match (room.window, across.site.log2(), across.site.straight()) {
-            (Window::USUAL, 3, false) => self.grow::<9, 6, 1, _>(&cells, bends),
-            (Window::USUAL, 3, true) => self.grow::<9, 6, 1, _>(&cells, flat),
-            (Window::USUAL, 4, false) => self.grow::<9, 6, 2, _>(&cells, bends),
-            (Window::USUAL, 4, true) => self.grow::<9, 6, 2, _>(&cells, flat),
-            (Window::NARROW, 3, false) => self.grow::<8, 6, 1, _>(&cells, bends),
-            (Window::SMALL, 3, false) => self.grow::<7, 7, 1, _>(&cells, bends),
-            (Window::SMALL, 3, true) => self.grow::<7, 7, 1, _>(&cells, flat),
+        match (across.site.log2(), across.site.straight()) {
+            (3, false) => self.grow::<1, _>(&cells, bends),
+            (3, true) => self.grow::<1, _>(&cells, flat),
+            (4, false) => self.grow::<2, _>(&cells, bends),
+            (4, true) => self.grow::<2, _>(&cells, flat),
             _ => 0,
         }
     }
 
     /// Appends tiles of `cells` of so many `TILES` a row of blocks, as long as each fits a window; returns of how many. The `lines` above and below start
     /// at their left corners.
+    // Windows have no code of their own: that would save a hundredth of a frame's instructions, for 4 KB.
     #[inline(never)]
-    fn grow<const WIDTH: u32, const ROWS: u32, const TILES: usize, T: Place>(&mut self, cells: &Cells<'_>, lines: [&[T]; 2]) -> u16 {
+    fn grow<const TILES: usize, T: Place>(&mut self, cells: &Cells<'_>, lines: [&[T]; 2]) -> u16 {
         let Some(slots) = self.tile.get_mut(self.tiles..).map(|slots| slots.as_chunks_mut::<TILES>().0) else { return 0 };
         let Some(slots) = slots.get_mut(..cells.most) else { return 0 };
-        let window = Window { width_log2: WIDTH, rows_log2: ROWS };
         // An axis after the other: what is known of both at a time would not fit a small processor's registers.
-        let done = lay_down::<TILES, T>(slots, lines, cells, window);
-        let done = lay_across::<TILES, T>(slots.get_mut(..done).unwrap_or(&mut []), lines, cells, window);
+        let done = lay_down::<TILES, T>(slots, lines, cells);
+        let done = lay_across::<TILES, T>(slots.get_mut(..done).unwrap_or(&mut []), lines, cells);
         self.near = slots.get(done.wrapping_sub(1)).and_then(|tiles| tiles.last()).map_or(self.near, |last| last.row);
         self.tiles = self.tiles.wrapping_add(done.wrapping_mul(TILES));
         done as u16
@@ -295,12 +290,8 @@ fn sums<T: Place>(above: &T, below: &T, one: impl Fn(Layer) -> i32) -> [i32; 2] 
 
 /// Fills `slots` with v of the tiles of `cells` between nodes above and below, and their windows, as long as there are such; returns of how many cells.
 #[inline(always)]
-fn lay_down<const TILES: usize, T: Place>(
-    slots: &mut [[Tile; TILES]],
-    [above, below]: [&[T]; 2],
-    cells: &Cells<'_>,
-    window: Window,
-) -> usize {
+fn lay_down<const TILES: usize, T: Place>(slots: &mut [[Tile; TILES]], [above, below]: [&[T]; 2], cells: &Cells<'_>) -> usize {
+    let window = cells.room.window;
     let v = |layer: Layer| layer.uv().v;
     let margin = cells.margin();
     // From the margin on: inside is what is not negative and below the room, one comparison for both.
@@ -336,12 +327,8 @@ fn lay_down<const TILES: usize, T: Place>(
 
 /// Adds u to the tiles in `slots`, likewise.
 #[inline(always)]
-fn lay_across<const TILES: usize, T: Place>(
-    slots: &mut [[Tile; TILES]],
-    [above, below]: [&[T]; 2],
-    cells: &Cells<'_>,
-    window: Window,
-) -> usize {
+fn lay_across<const TILES: usize, T: Place>(slots: &mut [[Tile; TILES]], [above, below]: [&[T]; 2], cells: &Cells<'_>) -> usize {
+    let window = cells.room.window;
     let margin = cells.margin();
     // From the margin on: inside is what is not negative and below the room, one comparison for both.
     let room = 1u32.wrapping_shl(window.width_log2.wrapping_add(16)).wrapping_sub((margin as u32).wrapping_mul(2));

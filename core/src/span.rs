@@ -68,7 +68,7 @@ impl Tiles<'_> {
     ) {
         let (mut tiles, mut blocks) = (self.tiles, out.as_chunks_mut::<PIXELS>().0.iter_mut());
         while let Some(first) = tiles.first() {
-            let (here, others) = tiles.split_at(usize::from(first.run).clamp(1, tiles.len()));
+            let (here, others) = tiles.split_at_checked(usize::from(first.run).max(1)).unwrap_or((tiles, &[]));
             tiles = others;
             let Some(window) = window(first.row) else {
                 let [even, odd] = [0, 1].map(|x| at(self.backdrop, x));

@@ -153,24 +153,21 @@ impl Window {
 
     /// The tile of `patch`, which shows `label`, 2^`log2` pixels wide and high, in a window from `row` on.
     #[must_use]
-    #[inline(always)]
+    // Long, and called from two places.
+    #[inline(never)]
     pub fn tile(self, patch: &Patch, label: u8, row: u16, log2: u32) -> Tile {
+        // What most bundles are made of has code of its own.
         let tile = match (self, log2) {
             (Self::USUAL, 3) => Self::USUAL.packed(patch, row, 3),
             (Self::SMALL, 3) => Self::SMALL.packed(patch, row, 3),
-            _ => self.any_tile(patch, row, log2),
+            _ => self.packed(patch, row, log2),
         };
         tile.of(label, row)
     }
 
-    #[inline(never)]
-    fn any_tile(self, patch: &Patch, row: u16, log2: u32) -> Tile {
-        self.packed(patch, row, log2)
-    }
-
     /// [`Window::tile`], written out where the window and `log2` are known.
     #[inline(always)]
-    pub fn packed(self, patch: &Patch, row: u16, log2: u32) -> Tile {
+    fn packed(self, patch: &Patch, row: u16, log2: u32) -> Tile {
         // Each by name: a map over both would be a call.
         let [(corners, sums), (corners_v, sums_v)] = patch.axes();
         let (u, v) = (Middle::new(corners, sums, log2), Middle::new(corners_v, sums_v, log2));
