@@ -19,6 +19,8 @@ const BENT: f64 = 2.0;
 const STEADY: f64 = 1.0;
 /// Side of a cell that is neither large nor small, pixels.
 const USUAL: u32 = 8;
+/// So many times as many wrong pixels as usual are too many for keys farther apart where outlines are few: they flicker, which no mean tells.
+const FLICKER: f64 = 1.25;
 /// Steps tried where positions bend, at most: fast turns want keys much closer.
 const BENT_TRIES: usize = 4;
 
@@ -84,7 +86,9 @@ pub(crate) fn choose(scene: &Scene, flat: &Flat, usual: Made, progress: Progress
             progress("trying other cells", f64::from(tried) / all as f64);
             tried += 1;
             let made = Made::new(scene, flat, *settings)?;
-            let worth = made.worth(picture);
+            let [before, after] = [&usual, &made].map(|made| made.quality.wrong_surface_percent);
+            let flickers = before < TORN && settings.key_interval > usual.settings.key_interval && after > FLICKER * before;
+            let worth = if flickers { f64::NEG_INFINITY } else { made.worth(picture) };
             if worth > better.as_ref().unwrap_or(&usual).worth(picture) {
                 better = Some(made);
             }

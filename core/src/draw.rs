@@ -48,18 +48,9 @@ impl Paint for Probes {
     }
 
     fn tiles<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, tiles: &Tiles<'_>, out: &mut [Probe]) {
-        let backdrop = |uv, _| Probe { label: BACKDROP as u8, at: uv };
-        // Without a label, each tile for itself.
-        let (blocks, log2) = (out.chunks_mut(1 << tiles.log2), tiles.log2);
-        for (tile, pixels) in tiles.tiles.iter().zip(blocks) {
-            let label = tile.label;
-            let make = |row: u16, at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(row) };
-            let one = Tiles { tiles: core::slice::from_ref(tile), ..*tiles };
-            let window = |row: u16| Some(row).filter(|_| tile.in_window());
-            match log2 {
-                3 => one.paint::<_, _, WIDTH, ROWS, 8, true>(pixels, [0; 2], window, make, backdrop),
-                _ => one.paint::<_, _, WIDTH, ROWS, 4, true>(pixels, [0; 2], window, make, backdrop),
-            }
+        match tiles.log2 {
+            3 => probe::<WIDTH, ROWS, 8>(tiles, out),
+            _ => probe::<WIDTH, ROWS, 4>(tiles, out),
         }
     }
 
@@ -67,6 +58,18 @@ impl Paint for Probes {
     fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, row: u32, shown: u32, out: &mut [Probe]) {
         let label = side.tile.label;
         span::part(&side.tile, row, shown, out, [0; 2], |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(side.tile.row) });
+    }
+}
+
+/// Where the pixels of `tiles` come from, `PIXELS` pixels each: for every tile by itself, since their labels differ.
+#[inline(always)]
+fn probe<const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(tiles: &Tiles<'_>, out: &mut [Probe]) {
+    let backdrop = |uv, _| Probe { label: BACKDROP as u8, at: uv };
+    for (tile, pixels) in tiles.tiles.iter().zip(out.as_chunks_mut::<PIXELS>().0) {
+        let window = |row: u16| Some(row).filter(|_| tile.in_window());
+        let make = |row: u16, at: Packed<WIDTH, ROWS>| Probe { label: tile.label, at: at.at(row) };
+        let one = Tiles { tiles: core::slice::from_ref(tile), ..*tiles };
+        one.paint::<_, _, WIDTH, ROWS, PIXELS, true>(pixels, [0; 2], window, make, backdrop);
     }
 }
 

@@ -164,10 +164,9 @@ pub fn share(
         // The last one covers what is left.
         let tested = place < last;
         let mut shown = left;
-        if tested && sheet.test() != CHART {
-            if !chart.fields().all(|which| above(site, sheet, which, offset, &mut shown)) {
-                continue;
-            }
+        let mut fields = if tested && sheet.test() != CHART { chart.fields() } else { 0..0 };
+        if !fields.all(|which| above(site, sheet, which, offset, &mut shown)) {
+            continue;
         }
         let cell = site.cell(sheet);
         let patch = site.block(&cell, offset);

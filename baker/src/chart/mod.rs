@@ -2,6 +2,7 @@
 //! Samples come from the G-buffer; charts go to the atlas, which places and colours them.
 
 mod absorb;
+mod apart;
 mod directions;
 mod family;
 mod flat;
@@ -254,7 +255,8 @@ pub fn build(scene: &Scene, hits: &Hits, family: Family, density: &Density, max_
         measure::measure(scene, hits, &mut charting, density, max_side);
     }
     charting.flatten(scene);
-    if fold::split(hits, &mut charting, &links) {
+    let (folded, parted) = (fold::split(hits, &mut charting, &links), apart::split(scene, hits, &mut charting, &links));
+    if folded || parted {
         measure::measure(scene, hits, &mut charting, density, max_side);
     }
     charting

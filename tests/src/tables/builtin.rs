@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// The columns: the key in JSON, the title, digits after the point.
-const COLUMNS: [(&str, &str, usize); 15] = [
+const COLUMNS: [(&str, &str, usize); 16] = [
     ("scene", "scene", 0),
     ("triangles", "triangles", 0),
     ("bundle_bytes", "bundle", 0),
@@ -27,6 +27,7 @@ const COLUMNS: [(&str, &str, usize); 15] = [
     ("host_frames_per_second", "host frames/s", 0),
     ("labels", "labels", 0),
     ("space", "space", 0),
+    ("key_interval", "frames a key", 0),
 ];
 
 /// The figures of one scene.
@@ -58,6 +59,7 @@ pub fn measure(scene: &Scene) -> Result<Value> {
         "bake_seconds": report.seconds.total,
         "cell": grid.cell,
         "space": grid.space,
+        "key_interval": grid.key_interval,
         "host_frames_per_second": work.host_frames_per_second,
     }))
 }
