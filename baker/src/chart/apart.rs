@@ -15,9 +15,9 @@ const REACH: usize = 6;
 const SHARE: f64 = 0.03;
 const FEW: f64 = 300.0 / 9.8e6;
 /// The share of them that a cut has to tell apart, beyond what it costs,
-const TOLD: f64 = 0.2;
+const TOLD: f64 = 0.3;
 /// which is this much for each pair of neighbouring pixels that it runs between.
-const SEAM: f64 = 0.3;
+const SEAM: f64 = 1.0;
 /// Cuts of a chart, at most, one after the other.
 const CUTS: usize = 6;
 /// Turns of the power iteration that finds the way across.
