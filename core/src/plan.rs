@@ -50,7 +50,7 @@ pub struct Plan<'m> {
 const BULGE: i32 = 1 << 18;
 
 impl Plan<'_> {
-    /// Plans row `strip` of the screen's blocks, for pixels that are told from as far as `reach` around a position; `sideless`: all mixed blocks are
+    /// Plans row `strip` of the screen's blocks, for pixels that are told from as far as `reach` around a position; `sideless`: all torn blocks are
     /// drawn pixel by pixel.
     #[inline(never)]
     pub fn make(&mut self, site: &Site<'_, '_, '_>, strip: u32, reach: i32, sideless: bool) {

@@ -32,7 +32,7 @@ struct Pair {
 
 /// A chart, or a part of one, that may have to be cut.
 struct Piece {
-    chart: usize,
+    chart: u32,
     faces: Vec<u32>,
     pairs: Vec<Pair>,
     /// How often it still may be.
@@ -42,18 +42,14 @@ struct Piece {
 /// Cuts charts; returns whether there were any to cut.
 pub(super) fn split(scene: &Scene, hits: &Hits, charting: &mut Charting, links: &Links) -> bool {
     let before = charting.charts.len();
-    let piece = |chart| Piece { chart, faces: Vec::new(), pairs: Vec::new(), cuts: CUTS };
-    let mut pieces: Vec<Piece> = (0..before).map(piece).collect();
-    for (face, &chart) in charting.chart_of.iter().enumerate() {
-        pieces[chart as usize].faces.push(face as u32);
-    }
+    let piece = |(chart, faces)| Piece { chart, faces, pairs: Vec::new(), cuts: CUTS };
+    let mut pieces: Vec<Piece> = (0u32..).zip(charting.members()).map(piece).collect();
     for (chart, pair) in pairs(scene, hits, charting) {
         pieces[chart as usize].pairs.push(pair);
     }
     let few = FEW * hits.samples.len() as f64;
     while let Some(Piece { chart, faces, pairs, cuts }) = pieces.pop() {
-        let seen: u64 = faces.iter().map(|&face| u64::from(charting.faces.list[face as usize].hits)).sum();
-        if cuts == 0 || (pairs.len() as f64) < few.max(SHARE * seen as f64) {
+        if cuts == 0 || (pairs.len() as f64) < few.max(SHARE * charting.seen(&faces) as f64) {
             continue;
         }
         let Some((axis, value)) = between(charting, links, &faces, &pairs) else { continue };
@@ -64,10 +60,7 @@ pub(super) fn split(scene: &Scene, hits: &Hits, charting: &mut Charting, links: 
             (faces.collect(), pairs.collect())
         };
         let [near, far] = [of(false), of(true)];
-        let other = charting.charts.len();
-        let copy = charting.charts[chart].clone();
-        charting.charts.push(copy);
-        far.0.iter().for_each(|&face| charting.chart_of[face as usize] = other as u32);
+        let other = charting.take_out(chart, &far.0);
         for (chart, (faces, pairs)) in [(chart, near), (other, far)] {
             pieces.push(Piece { chart, faces, pairs, cuts: cuts - 1 });
         }

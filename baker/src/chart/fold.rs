@@ -52,7 +52,6 @@ struct Grid {
 /// Splits charts that fold over themselves; returns whether there were any.
 pub(super) fn split(hits: &Hits, charting: &mut Charting, links: &Links) -> bool {
     let touches = touches(hits, charting);
-    let mut members: Vec<Vec<u32>> = vec![Vec::new(); charting.charts.len()];
     let mut first = vec![touches.len(); charting.faces.list.len() + 1];
     for (i, t) in touches.iter().enumerate().rev() {
         first[t.face as usize] = i;
@@ -60,25 +59,19 @@ pub(super) fn split(hits: &Hits, charting: &mut Charting, links: &Links) -> bool
     for f in (0..charting.faces.list.len()).rev() {
         first[f] = first[f].min(first[f + 1]);
     }
-    for (f, &c) in charting.chart_of.iter().enumerate() {
-        members[c as usize].push(f as u32);
-    }
     let mut found = false;
     let few = (FEW * hits.samples.len() as f64) as u64;
     let mut state = vec![OUTSIDE; charting.faces.list.len()];
-    let mut work: VecDeque<(u32, Vec<u32>)> = members.into_iter().enumerate().map(|(c, m)| (c as u32, m)).collect();
+    let mut work: VecDeque<(u32, Vec<u32>)> = (0u32..).zip(charting.members()).collect();
     while let Some((chart, faces)) = work.pop_front() {
         let rejected = examine(charting, links, &faces, chart, &mut state, |f| &touches[first[f as usize]..first[f as usize + 1]]);
         for part in rejected {
             // A few wrong pixels cost less than another chart.
-            if part.iter().map(|&f| u64::from(charting.faces.list[f as usize].hits)).sum::<u64>() < few {
+            if charting.seen(&part) < few {
                 continue;
             }
             found = true;
-            let id = charting.charts.len() as u32;
-            let copy = charting.charts[chart as usize].clone();
-            charting.charts.push(copy);
-            part.iter().for_each(|&f| charting.chart_of[f as usize] = id);
+            let id = charting.take_out(chart, &part);
             work.push_back((id, part));
         }
     }

@@ -125,6 +125,28 @@ impl Charting {
         [b / (a + b + c), c / (a + b + c)]
     }
 
+    /// The faces of each chart.
+    fn members(&self) -> Vec<Vec<u32>> {
+        let mut members = vec![Vec::new(); self.charts.len()];
+        for (face, &chart) in self.chart_of.iter().enumerate() {
+            members[chart as usize].push(face as u32);
+        }
+        members
+    }
+
+    /// Pixels, over all frames, that see one of `faces`.
+    fn seen(&self, faces: &[u32]) -> u64 {
+        faces.iter().map(|&face| u64::from(self.faces.list[face as usize].hits)).sum()
+    }
+
+    /// Takes `faces` out of chart `chart` into one of their own that is flattened alike: which.
+    fn take_out(&mut self, chart: u32, faces: &[u32]) -> u32 {
+        let other = self.charts.len() as u32;
+        self.charts.push(self.charts[chart as usize].clone());
+        faces.iter().for_each(|&face| self.chart_of[face as usize] = other);
+        other
+    }
+
     /// Cuts chart `chart` in two along a line across one of its flattened coordinates, where that one has this value: faces go to the side that their
     /// middles lie on. Returns what was before; `None`, and nothing is done, where one side would have none.
     pub(crate) fn sever(&mut self, hits: &Hits, chart: usize, (axis, value): (usize, f64)) -> Option<Parts> {
