@@ -13,7 +13,7 @@ use crate::sheets::{self, KeyGrid, Layers};
 use crate::trace::Tracer;
 use crate::verify::VerifyError;
 use crate::walls;
-use crate::{cuts, fields, fit, order, polish, spare, tears, timing};
+use crate::{cuts, fields, fit, order, polish, prune, spare, tears, timing};
 use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC};
 use std::time::Instant;
 use thiserror::Error;
@@ -130,6 +130,9 @@ pub struct Settings {
     pub sparing: Sparing,
     /// A label seen in fewer pixels of a cell and interval is left out of it; a torn part of one in fewer than twice as many.
     pub least_pixels: u32,
+    /// Mean squared error, mean of the components 0..=255, that pictures are expected to have: sheets that save less than their layers' share of it are
+    /// left out. 0 keeps all.
+    pub error: f64,
     /// Wrong pixels that a field has to save in a cell and interval to be used.
     pub field_price: u32,
     /// The coverage tests to choose from.
@@ -148,6 +151,7 @@ impl Default for Settings {
             coding: CodingSettings { step_log2: 0, lambda: 0.01, independent_every: 16 },
             sparing: Sparing::Nothing,
             least_pixels: 8,
+            error: 0.0,
             field_price: 4,
             coverage: Coverage::All,
         }
@@ -262,6 +266,9 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let exact = &flat.atlas.gbuffer;
     let (gbuffer, image) = (&gbuffer, &SourceImage { labels, ..image.clone() });
     let mut sheets = sheets::find(gbuffer, &grid, least);
+    if settings.error > 0.0 {
+        prune::prune(&mut sheets, gbuffer, image, &grid, settings.error);
+    }
     let torn_by_cause = causes::count(exact, &flat.tears, &flat.seams, &grid, &sheets);
     let layers = Layers::of(&grid, &sheets);
     progress("fitting keys", 0.2);

@@ -147,6 +147,13 @@ pub struct Bake {
     /// picture of fine stripes needs 0.01. Searches (--budget, --psnr) choose on their own.
     #[arg(long, value_name = "WORTH", value_parser = lambda, default_value = "auto")]
     pub lambda: Worth,
+    /// Which of the surfaces that a cell sees it keeps.
+    ///
+    /// Auto leaves out of a cell what shows less there than its bytes are worth, as --lambda counts them, and only where a bundle without it is worth more:
+    /// keys of models take a tenth to a third fewer bytes then, and their player up to half less memory, for .1 to .3 dB. All keeps whatever covers
+    /// eight pixels of a cell in all frames between two keys.
+    #[arg(long, value_enum, value_name = "KIND", default_value_t = Sheets::Auto)]
+    pub sheets: Sheets,
     /// Every Nth key needs no earlier one: a seek decodes at most N + 1 keys.
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=1000))]
     pub independent_every: u16,
@@ -258,6 +265,15 @@ pub enum Rewarp {
     Off,
     /// In every chart but those whose texels are the scene's own.
     On,
+}
+
+/// Which of the surfaces that a cell sees it keeps.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Sheets {
+    /// What is worth its bytes.
+    Auto,
+    /// All but the smallest.
+    All,
 }
 
 /// What replaces the scene's playback.
@@ -386,6 +402,7 @@ impl Bake {
                 Worth::Of(worth) => Some(worth as f32),
             },
             independent_every: self.independent_every.into(),
+            all_sheets: self.sheets == Sheets::All,
             goal,
             truth: self.truth,
             load_seconds,

@@ -48,7 +48,7 @@ impl Step {
     pub const DOUBLE: Self = Self { scale: 1, ..Self::NONE };
     pub const HALF: Self = Self { scale: -1, ..Self::NONE };
     /// Keys a little closer, a little farther apart.
-    const CLOSER: Self = Self { interval: -1, ..Self::NONE };
+    pub const CLOSER: Self = Self { interval: -1, ..Self::NONE };
     const FARTHER: Self = Self { interval: 1, ..Self::NONE };
     /// A bit worth more, less.
     const DEARER: Self = Self { lambda: 1, ..Self::NONE };

@@ -1,7 +1,7 @@
 //! Cells and keys of another shape: where so many outlines cross a cell that sheets are given up in a good part of the picture, cells half as large
 //! with keys twice as far apart may show more for the bytes, or keys twice as far apart as much for fewer; where positions hardly bend on their way
-//! from key to key, the latter alone; where outlines are few but positions bend, keys twice as close show more, and on rough land cells twice as large
-//! besides, in less memory. A bundle baked as usual comes from `job`; the best of a few goes back.
+//! from key to key, the latter alone, or else closer ones; where outlines are few but positions bend, keys twice as close show more, and on rough land
+//! cells twice as large besides, in less memory. A bundle baked as usual comes from `job`; the best of a few goes back.
 
 use crate::bake::{BakeError, Flat, Progress, Settings};
 use crate::climb::{Free, Step, climb};
@@ -21,6 +21,9 @@ const STEADY: f64 = 1.0;
 const USUAL: u32 = 8;
 /// So many times as many wrong pixels as usual are too many for keys farther apart where outlines are few: they flicker, which no mean tells.
 const FLICKER: f64 = 1.25;
+/// Why keys farther apart are used where neither many outlines nor bends are, and why closer ones.
+const STEADILY: &str = "surfaces go straight on from key to key";
+const TURNING: &str = "outlines turn on their way from key to key";
 /// Steps tried where positions bend, at most: fast turns want keys much closer.
 const BENT_TRIES: usize = 4;
 
@@ -54,40 +57,49 @@ fn climbs(cell: u32, quality: &Quality) -> Option<(&'static [Climb], &'static st
     const FARTHER: Climb = (&[Step::DOUBLE], 1);
     const FAR: Climb = (&[Step::DOUBLE], 2);
     const CLOSER: Climb = (&[Step::COARSER, Step::HALF], BENT_TRIES);
+    const CLOSE: Climb = (&[Step::HALF, Step::CLOSER], 2);
     let (torn, bent) = (quality.wrong_surface_percent >= TORN, quality.path_error_texels.p99);
     let climbs: &[Climb] = match torn {
         true if bent < STEADY || cell > USUAL => &[FINER, FARTHER],
         true if bent < BENT => &[FARTHER],
         false if bent >= BENT => &[CLOSER],
-        false if bent < STEADY => &[FAR],
-        _ => return None,
+        false if bent < STEADY => &[FAR, CLOSE],
+        false => &[CLOSE],
+        true => return None,
     };
     let why = match torn {
         true => "many outlines cross every cell",
         false if bent >= BENT => "surfaces bend on their way from key to key",
-        false => "surfaces go straight on from key to key",
+        false => STEADILY,
     };
     Some((climbs, why))
 }
 
-/// `usual`, or a bundle of other cells or intervals if that is worth more, as sparing counts it; and then why.
+/// `usual`, or a bundle of other cells or intervals if that is worth more, as sparing counts it; and then why. `all`: quality before sheets were left out.
 ///
 /// # Errors
 /// Those of encoding, and of the player.
-pub(crate) fn choose(scene: &Scene, flat: &Flat, usual: Made, progress: Progress<'_>) -> Result<(Made, Option<Other>), BakeError> {
-    let Some((climbs, why)) = climbs(usual.settings.cell, &usual.quality) else { return Ok((usual, None)) };
+pub(crate) fn choose(
+    scene: &Scene,
+    flat: &Flat,
+    usual: Made,
+    all: &Quality,
+    progress: Progress<'_>,
+) -> Result<(Made, Option<Other>), BakeError> {
+    let Some((climbs, why)) = climbs(usual.settings.cell, all) else { return Ok((usual, None)) };
     let picture = usual.picture(flat);
     let free = Free { cell: true, interval: true, lambda: false, time: false, space: false, frames: scene.playback.frames };
     let mut better: Option<Made> = None;
-    let all: usize = climbs.iter().map(|(_, tries)| tries).sum();
+    let most: usize = climbs.iter().map(|(_, tries)| tries).sum();
     let mut tried = 0;
     for &(steps, tries) in climbs {
         climb((usual.settings, usual.worth(picture)), &free, steps, tries, |settings| {
-            progress("trying other cells", f64::from(tried) / all as f64);
+            progress("trying other cells", f64::from(tried) / most as f64);
             tried += 1;
             let made = Made::new(scene, flat, *settings)?;
             let [before, after] = [&usual, &made].map(|made| made.quality.wrong_surface_percent);
-            let flickers = before < TORN && settings.key_interval > usual.settings.key_interval && after > FLICKER * before;
+            let flickers =
+                all.wrong_surface_percent < TORN && settings.key_interval > usual.settings.key_interval && after > FLICKER * before;
             let worth = if flickers { f64::NEG_INFINITY } else { made.worth(picture) };
             if worth > better.as_ref().unwrap_or(&usual).worth(picture) {
                 better = Some(made);
@@ -99,6 +111,7 @@ pub(crate) fn choose(scene: &Scene, flat: &Flat, usual: Made, progress: Progress
         }
     }
     let Some(better) = better else { return Ok((usual, None)) };
+    let why = if why == STEADILY && better.settings.key_interval < usual.settings.key_interval { TURNING } else { why };
     let other = Other { why, usual: usual.settings, told: usual.told() };
     Ok((better, Some(other)))
 }
@@ -117,12 +130,17 @@ mod tests {
         (scene, flat, made)
     }
 
+    fn chosen(scene: &Scene, flat: &Flat, usual: Made) -> (Made, Option<Other>) {
+        let all = usual.quality.clone();
+        choose(scene, flat, usual, &all, &|_, _| {}).unwrap()
+    }
+
     #[test]
     fn pictures_that_come_out_right_keep_their_cells() {
         let settings = Settings { key_interval: 16, ..Settings::default() };
         let (scene, flat, coarse) = made("cone-orbit", [160, 120], 65, settings);
         let bytes = coarse.encoded.bundle.clone();
-        let (kept, other) = choose(&scene, &flat, coarse, &|_, _| {}).unwrap();
+        let (kept, other) = chosen(&scene, &flat, coarse);
         assert_eq!((kept.settings.cell, kept.encoded.bundle == bytes, other.is_none()), (settings.cell, true, true));
     }
 
@@ -131,7 +149,7 @@ mod tests {
         let (scene, flat, usual) = made("cone-orbit", [160, 120], 65, Settings::default());
         let picture = usual.picture(&flat);
         let (before, bytes) = (usual.worth(picture), usual.encoded.bundle.len());
-        let (kept, other) = choose(&scene, &flat, usual, &|_, _| {}).unwrap();
+        let (kept, other) = chosen(&scene, &flat, usual);
         assert_eq!((kept.settings.cell, kept.settings.key_interval, other.is_some()), (8, 16, true));
         assert!(kept.worth(picture) > before && kept.encoded.bundle.len() < bytes);
     }
@@ -142,7 +160,7 @@ mod tests {
         let settings = Settings { cell: 16, key_interval: 4, ..Settings::default() };
         let (scene, flat, coarse) = made("round-columns", [64, 48], 17, settings);
         let before = coarse.quality.psnr_mean;
-        let (kept, other) = choose(&scene, &flat, coarse, &|_, _| {}).unwrap();
+        let (kept, other) = chosen(&scene, &flat, coarse);
         let after = verify::against_exact(&kept.encoded.bundle, &flat.atlas, &|_, _| {}).unwrap();
         assert_eq!((kept.settings.cell, kept.settings.key_interval, other.is_some()), (8, 8, true));
         assert!(after.psnr_mean > before + 0.5 && after.psnr_mean == kept.quality.psnr_mean, "{before} {after:?}");
@@ -156,7 +174,7 @@ mod tests {
         let (scene, flat, usual) = made("terrain", [96, 72], 65, settings);
         let picture = usual.picture(&flat);
         let (before, told) = (usual.worth(picture), usual.told());
-        let (kept, other) = choose(&scene, &flat, usual, &|_, _| {}).unwrap();
+        let (kept, other) = chosen(&scene, &flat, usual);
         assert_eq!((kept.settings.cell, kept.settings.key_interval), (16, 8));
         let said = other.unwrap().said(&kept);
         assert!(kept.worth(picture) > before && said.contains(&told) && said.contains("--cell 16 --key-interval 8"), "{before} {said}");
@@ -168,7 +186,7 @@ mod tests {
         let settings = Settings { cell: 8, key_interval: 8, ..Settings::default() };
         let (scene, flat, usual) = made("cone-orbit", [96, 72], 9, settings);
         let before = usual.quality.psnr_mean;
-        let (kept, _) = choose(&scene, &flat, usual, &|_, _| {}).unwrap();
+        let (kept, _) = chosen(&scene, &flat, usual);
         assert!(kept.settings.key_interval < 8 && kept.quality.psnr_mean > before + 2.0, "{before} {}", kept.told());
     }
 
@@ -181,7 +199,10 @@ mod tests {
         };
         // Torn and steady, torn and not quite so, both torn and bent, the last in large cells; bent; neither; steady.
         assert_eq!([tried(8, 2.0, 0.9), tried(8, 2.0, 1.0), tried(8, 2.0, 2.0)], [Some((2, "many")), Some((1, "many")), None]);
-        assert_eq!([tried(16, 2.0, 2.0), tried(8, 1.9, 2.0), tried(8, 1.9, 1.9)], [Some((2, "many")), Some((1, "surfaces")), None]);
-        assert_eq!(tried(8, 1.9, 0.9), Some((1, "surfaces")));
+        assert_eq!(
+            [tried(16, 2.0, 2.0), tried(8, 1.9, 2.0), tried(8, 1.9, 1.9)],
+            [Some((2, "many")), Some((1, "surfaces")), Some((1, "surfaces"))]
+        );
+        assert_eq!(tried(8, 1.9, 0.9), Some((2, "surfaces")));
     }
 }

@@ -5,6 +5,7 @@ use crate::atlas::{self, Storage};
 use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings, Sparing};
 use crate::chart::{self, Choice, Family};
 use crate::choose;
+use crate::fewer;
 use crate::finer;
 use crate::inspect::Inspection;
 use crate::made::Made;
@@ -70,6 +71,8 @@ pub struct Options {
     pub lambda: Option<f32>,
     /// Every this many keys one that needs no earlier one.
     pub independent_every: usize,
+    /// Keeps sheets that take more than what they show is worth.
+    pub all_sheets: bool,
     /// What to reach.
     pub goal: Goal,
     /// How much is compared with the truth.
@@ -93,6 +96,7 @@ impl Default for Options {
             rewarp: None,
             lambda: None,
             independent_every: Settings::default().coding.independent_every,
+            all_sheets: false,
             goal: Goal::AsSet,
             truth: TruthFrames::Most(16),
             load_seconds: 0.0,
@@ -152,6 +156,8 @@ pub struct Baked {
     pub report: Report,
     /// The source image and the G-buffer they came from.
     pub flat: Flat,
+    /// What made them.
+    pub settings: Settings,
 }
 
 /// What was chosen: by the settings or by a search.
@@ -163,6 +169,15 @@ pub(crate) struct Chosen {
     pub search_seconds: f64,
     /// What the user should know about the choice.
     pub warnings: Vec<String>,
+}
+
+/// A bundle that needs more memory than there is.
+#[derive(Clone, Copy)]
+pub(crate) struct Whole {
+    pub settings: Settings,
+    pub memory: usize,
+    /// Mean PSNR against exact rays, dB.
+    pub psnr: f64,
 }
 
 /// Bakes a scene, verifies the bundle and reports; `progress` hears the stages.
@@ -182,6 +197,17 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
     let start = Instant::now();
     let choice = choice(scene, options, progress)?;
     let options = &Options { charts: Some(choice), ..*options };
+    // What needs no more memory than there is stays as it is; where it cannot be had at all, the search says why.
+    let mut whole = None;
+    if let Goal::Ram(room) = options.goal
+        && let Ok(baked) = run(scene, &Options { goal: Goal::AsSet, ..*options }, progress)
+    {
+        let memory = baked.report.memory.workspace;
+        if memory <= room {
+            return Ok(baked);
+        }
+        whole = Some(Whole { settings: baked.settings, memory, psnr: baked.report.quality.psnr_mean });
+    }
     let choice_seconds = start.elapsed().as_secs_f64();
     let settings = options.settings(scene.playback.width);
     let Chosen { flat, encoded, settings, search_seconds, warnings } = match options.goal {
@@ -191,7 +217,7 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
             let encoded = bake::encode(scene, &flat, &settings, progress)?;
             Chosen { flat, encoded, settings, search_seconds: 0.0, warnings: Vec::new() }
         }
-        goal => tune::search(scene, options, goal, progress)?,
+        goal => tune::search(scene, options, goal, whole, progress)?,
     };
     let exact_start = Instant::now();
     let part = |done: u32, total: u32| f64::from(done) / f64::from(total.max(1));
@@ -199,8 +225,12 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
     let quality = verify::against_exact(&encoded.bundle, &flat.atlas, &|d, n| progress("comparing with exact rays", part(d, n)))?;
     let (exact_seconds, finer_start) = (exact_start.elapsed().as_secs_f64(), Instant::now());
     let free = options.goal == Goal::AsSet && options.cell.is_none() && options.key_interval.is_none();
+    let all = quality.clone();
     let made = Made { settings, encoded, quality };
-    let (made, other) = if free { finer::choose(scene, &flat, made, progress)? } else { (made, None) };
+    // Searches have left out what they could.
+    let prunes = !options.all_sheets && options.goal == Goal::AsSet;
+    let made = if prunes { fewer::choose(scene, &flat, made, progress)? } else { made };
+    let (made, other) = if free { finer::choose(scene, &flat, made, &all, progress)? } else { (made, None) };
     let bends = options.goal == Goal::AsSet && options.space.is_none();
     let (made, spaces) = if bends { straight::choose(scene, &flat, made, progress)? } else { (made, Vec::new()) };
     let finer = other.map(|other| other.said(&made));
@@ -233,7 +263,7 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
     let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings, spaces };
     let mut report = Report::new(&origin, &inspection, quality, truth, work, seconds);
     report.warnings.extend(warnings.into_iter().chain(finer));
-    Ok(Baked { bundle: encoded.bundle, report, flat })
+    Ok(Baked { bundle: encoded.bundle, report, flat, settings })
 }
 
 /// How to cut the surface: as asked for, as the scene brings it, or as trials show.

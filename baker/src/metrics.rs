@@ -14,6 +14,12 @@ pub fn psnr(mse: f64) -> f64 {
     if mse <= 0.0 { PERFECT } else { (10.0 * libm::log10(255.0 * 255.0 / mse)).min(PERFECT) }
 }
 
+/// The mean squared error of a picture of `psnr` dB.
+#[must_use]
+pub fn mse(psnr: f64) -> f64 {
+    255.0 * 255.0 / libm::pow(10.0, 0.1 * psnr)
+}
+
 /// What a picture of `psnr` dB for `bytes` is worth, dB, where twice the bytes have to bring `double` dB.
 #[must_use]
 pub fn worth(psnr: f64, bytes: u64, double: f64) -> f64 {

@@ -8,7 +8,7 @@ use crate::bake::{BakeError, Encoded, Flat, Settings};
 use crate::climb::{Free, Step, climb};
 use crate::encode::image_bytes;
 use crate::inspect::{space_name, time_name};
-use crate::job::Chosen;
+use crate::job::{Chosen, Whole};
 use crate::metrics;
 use crate::report::grouped;
 use crate::tune::{Search, possible};
@@ -57,33 +57,24 @@ struct Found {
 impl Search<'_> {
     /// The best bundle that plays in `room` bytes of working memory.
     ///
-    /// What is asked for is taken as it is where it fits. Else straight time, straight space and larger cells are tried, each as far as
-    /// the user left it open, and shorter intervals, whose cells see fewer labels, where none of that fits; from the one worth most of those that
-    /// do, steps lead on: closer keys may well make up for what had to go.
+    /// Straight time, straight space and larger cells than those of the `whole` bundle are tried, each as far as the user left it open, and shorter
+    /// intervals, whose cells see fewer labels, where none of that fits; from the one worth most of those that do, steps lead on: closer keys may well
+    /// make up for what had to go.
     ///
     /// # Errors
     /// [`BakeError::Ram`] where nothing fits; whatever flattening and encoding say.
-    pub(crate) fn ram(&self, room: usize) -> Result<Chosen, BakeError> {
-        let asked = self.options.settings(self.scene.playback.width);
+    pub(crate) fn ram(&self, room: usize, whole: Option<Whole>) -> Result<Chosen, BakeError> {
+        let asked = whole.map_or(self.options.settings(self.scene.playback.width), |whole| whole.settings);
         let flat = self.flat(asked.atlas)?;
         let mut found = Found::default();
-        let mut first = self.attempt(&flat, asked, &mut found)?;
-        if let Some(fits) = first.take_if(|first| first.memory <= room) {
-            return Ok(Chosen { flat, encoded: fits.encoded, settings: fits.settings, search_seconds: 0.0, warnings: Vec::new() });
-        }
-        let whole = match &first {
-            Some(first) => Some((first.memory, value(&flat, first)?.psnr)),
-            None => None,
-        };
+        // Sheets that show little go first, also where they would be worth their bytes.
+        let error = self.prunes(whole.map_or(0.0, |whole| metrics::mse(whole.psnr)));
+        let fewer = Settings { error: error.max(asked.error), ..asked };
         let shorter = (self.options.key_interval.is_none() && asked.key_interval > 1).then_some(asked.key_interval / 2);
         for (turn, key_interval) in [Some(asked.key_interval), shorter].into_iter().flatten().enumerate() {
             for (step, cell) in CELLS.into_iter().filter(|&cell| cell >= asked.cell).enumerate() {
                 self.say(step + CELLS.len() * turn, 2 * CELLS.len());
-                let tried = match first.take() {
-                    Some(first) => Some(first),
-                    None => self.attempt(&flat, Settings { cell, key_interval, ..asked }, &mut found)?,
-                };
-                let Some(tried) = tried else { continue };
+                let Some(tried) = self.attempt(&flat, Settings { cell, key_interval, ..fewer }, &mut found)? else { continue };
                 if tried.memory <= room {
                     // Larger cells only lose.
                     found.consider(&flat, tried)?;
@@ -196,18 +187,19 @@ fn memory_as(bundle: &[u8], time: u8, space: u8) -> Option<usize> {
     Some(Bundle::parse(&bytes).ok()?.memory_needed())
 }
 
-/// What the user should know: how `tried` differs from what was `asked` for, and what that costs. `whole`: memory and PSNR, dB, of that.
-fn gave_up(room: usize, asked: &Settings, whole: Option<(usize, f64)>, tried: &Tried, psnr: f64) -> String {
+/// What the user should know: how `tried` differs from what was `asked` for, and what that costs. `whole`: the bundle that is too large.
+fn gave_up(room: usize, asked: &Settings, whole: Option<Whole>, tried: &Tried, psnr: f64) -> String {
     let Settings { time, space, cell, key_interval, .. } = tried.settings;
     let changes = [
         (time != asked.time).then(|| format!("--time {} instead of {}", time_name(time), time_name(asked.time))),
         (space != asked.space).then(|| format!("--space {} instead of {}", space_name(space), space_name(asked.space))),
+        (tried.settings.error > asked.error).then(|| "sheets left out that show little".to_owned()),
         (cell != asked.cell).then(|| format!("--cell {cell} instead of {}", asked.cell)),
         (key_interval != asked.key_interval).then(|| format!("--key-interval {key_interval} instead of {}", asked.key_interval)),
     ];
     let changes: Vec<String> = changes.into_iter().flatten().collect();
     let cost = match whole {
-        Some((memory, most)) => {
+        Some(Whole { memory, psnr: most, .. }) => {
             format!("{psnr:.2} dB in {} bytes of memory, where {most:.2} dB take {}", grouped(tried.memory), grouped(memory))
         }
         None => format!("{psnr:.2} dB in {} bytes of memory", grouped(tried.memory)),

@@ -281,8 +281,12 @@ fn warnings(origin: &Origin<'_>) -> Vec<String> {
     let dropped = 100.0 * encoded.dropped_pixels as f64 / flat.rays.max(1) as f64;
     if dropped > DROPPED_PERCENT {
         let cure = finer(settings.cell, settings.key_interval);
+        let (what, cure) = match settings.error > 0.0 {
+            true => (", or that shows less there than it takes", format!("--sheets all keeps more, {cure}")),
+            false => ("", cure.to_owned()),
+        };
         out.push(format!(
-            "{dropped:.2} % of the pixels show a surface too small for its cell of {0} x {0} pixels x {1} frames; they show a neighbour instead; {cure}",
+            "{dropped:.2} % of the pixels show a surface too small for its cell of {0} x {0} pixels x {1} frames{what}; they show a neighbour instead; {cure}",
             settings.cell, settings.key_interval
         ));
     }

@@ -7,7 +7,8 @@ use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings, Sparing};
 use crate::climb::{Free, Step, climb};
 use crate::encode::{self, image_bytes};
 use crate::gbuffer::Hits;
-use crate::job::{self, Chosen, Goal, Options};
+use crate::job::{self, Chosen, Goal, Options, Whole};
+use crate::metrics;
 use crate::report::grouped;
 use crate::samples::Samples;
 use crate::scene::Scene;
@@ -36,12 +37,18 @@ const MOST_MEMORY: usize = 128 << 10;
 /// How far a predicted size may lie over the budget and still be tried: coarser keys take less.
 const SLACK: f64 = 1.15;
 
-/// Searches for `goal`.
+/// Searches for `goal`. `whole`: what is too large for a [`Goal::Ram`], where there is such a bundle.
 ///
 /// # Errors
 /// [`BakeError::Budget`], [`BakeError::Psnr`] or [`BakeError::Ram`] where nothing reaches the goal, with the nearest that can be; whatever
 /// flattening and encoding say.
-pub(crate) fn search(scene: &Scene, options: &Options, goal: Goal, progress: Progress<'_>) -> Result<Chosen, BakeError> {
+pub(crate) fn search(
+    scene: &Scene,
+    options: &Options,
+    goal: Goal,
+    whole: Option<Whole>,
+    progress: Progress<'_>,
+) -> Result<Chosen, BakeError> {
     let start = Instant::now();
     progress("building the hierarchy", 0.0);
     let tracer = Tracer::new(scene);
@@ -50,7 +57,7 @@ pub(crate) fn search(scene: &Scene, options: &Options, goal: Goal, progress: Pro
     let mut chosen = match goal {
         Goal::Budget(budget) => search.budget(budget)?,
         Goal::Psnr(asked) => search.psnr(asked)?,
-        Goal::Ram(room) => search.ram(room)?,
+        Goal::Ram(room) => search.ram(room, whole)?,
         Goal::AsSet => {
             let settings = options.settings(scene.playback.width);
             let flat = search.flat(settings.atlas)?;
@@ -208,15 +215,22 @@ impl Search<'_> {
     fn keys(&self, flat: &Flat, samples: &Samples, steps: usize) -> Result<Vec<Keys>, BakeError> {
         let asked = self.options.source();
         let (image_bytes, image_error) = (image_bytes(&flat.atlas.image, asked.storage), samples.of_image(&flat.atlas));
-        let (mut keys, mut exceeded) = (Vec::new(), None);
+        let (mut keys, mut exceeded) = (Vec::<Keys>::new(), None);
         for mut settings in self.grids(asked) {
             self.say(IMAGES + keys.len(), steps);
             settings.coding.lambda = BUDGET_LAMBDA;
+            // The last grid's error is about this one's, and a little more.
+            settings.error = self.prunes(keys.last().map_or(0.0, |keys| keys.error));
             let Some(Encoded { bundle, .. }) = possible(self.encode(flat, &settings), &mut exceeded)? else { continue };
             let (error, _) = samples.of_bundle(&bundle)?;
             keys.push(Keys { settings, bytes: bundle.len().saturating_sub(image_bytes), error: (error - image_error).max(0.0) });
         }
         exceeded.filter(|_| keys.is_empty()).map_or(Ok(keys), Err)
+    }
+
+    /// The error that sheets are left out at where pictures have about that of `error`: none where all are asked for.
+    pub(crate) fn prunes(&self, error: f64) -> f64 {
+        if self.options.all_sheets { 0.0 } else { error }
     }
 
     /// What the user left open, and what a bit is worth, which searches choose.
@@ -261,7 +275,8 @@ impl Search<'_> {
                 Some((fine, flat)) if fine == fineness(&image.source) => flat,
                 _ => self.flat(image.source)?,
             };
-            let settings = Settings { atlas: source, sparing: Sparing::Within(budget), ..keys.settings };
+            let error = self.prunes(keys.error);
+            let settings = Settings { atlas: source, sparing: Sparing::Within(budget), error, ..keys.settings };
             let found = score(&flat, &settings, true)?;
             current = Some((fineness(&image.source), flat));
             let Some(found) = found else { continue };
@@ -328,6 +343,7 @@ impl Search<'_> {
             if turn == 0 {
                 source.density *= flat.atlas.figures.scale;
                 for settings in self.grids(wanted) {
+                    let settings = Settings { error: self.prunes(metrics::mse(asked)), ..settings };
                     if let Some(found) = score(&flat, &settings, true)?
                         && best.is_none_or(|(_, most)| found > most)
                     {

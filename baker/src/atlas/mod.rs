@@ -158,10 +158,23 @@ impl SourceImage {
     /// The colour at a position, texels; outside the image that of the nearest texel.
     #[inline]
     #[must_use]
-    pub fn colour_at(&self, [u, v]: [f32; 2]) -> [u8; 3] {
+    pub fn colour_at(&self, uv: [f32; 2]) -> [u8; 3] {
+        self.colour(self.texels[self.place(uv)])
+    }
+
+    /// Whether the texel at a position shows a surface rather than continues one; outside the image the nearest texel.
+    #[inline]
+    #[must_use]
+    pub fn covered_at(&self, uv: [f32; 2]) -> bool {
+        self.covered[self.place(uv)]
+    }
+
+    /// The index of the texel at a position, texels; outside the image that of the nearest texel.
+    #[inline]
+    fn place(&self, [u, v]: [f32; 2]) -> usize {
         // What is below zero comes to zero.
         let (x, y) = ((u as u32).min(self.width - 1), (v as u32).min(self.height - 1));
-        self.colour(self.texels[(y * self.width + x) as usize])
+        (y * self.width + x) as usize
     }
 }
 
