@@ -72,12 +72,13 @@ pub struct Bake {
     /// twice as large with keys twice as close, if that shows more for the bytes.
     #[arg(long, value_name = "PX", value_parser = cell)]
     pub cell: Option<u32>,
-    /// Frames between keys, 1 to 256 [default: 8; 16 where that shows as much for the bytes].
+    /// Frames between keys, 1 to 256 [default: 8; 16 where that shows as much for the bytes, 4 or 6 where that shows more].
     ///
     /// That is the mean: keys stand closer where the view turns quickly, and at a path's ends, unless --even-keys says otherwise.
     ///
     /// Keys twice as far apart take a third fewer bytes and half as much of every frame's time. Each holds more, for what comes into view between two of
-    /// them: that is up to a sixth more memory. Without this and --cell they are tried where surfaces go nearly straight on from key to key.
+    /// them: that is up to a sixth more memory. Without this and --cell they are tried where surfaces go nearly straight on from key to key, and closer
+    /// ones where that leads nowhere.
     #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(1..=256))]
     pub key_interval: Option<u32>,
     /// Keys stand every --key-interval frames, whether or not they are needed there.
@@ -150,7 +151,7 @@ pub struct Bake {
     /// Which of the surfaces that a cell sees it keeps.
     ///
     /// Auto leaves out of a cell what shows less there than its bytes are worth, as --lambda counts them, and only where a bundle without it is worth more:
-    /// keys of models take a tenth to a third fewer bytes then, and their player up to half less memory, for .1 to .3 dB. All keeps whatever covers
+    /// keys of models take a tenth to a third fewer bytes then, and their player up to half less memory, for 0 to .2 dB. All keeps whatever covers
     /// eight pixels of a cell in all frames between two keys.
     #[arg(long, value_enum, value_name = "KIND", default_value_t = Sheets::Auto)]
     pub sheets: Sheets,

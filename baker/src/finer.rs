@@ -24,6 +24,10 @@ const FLICKER: f64 = 1.25;
 /// Why keys farther apart are used where neither many outlines nor bends are, and why closer ones.
 const STEADILY: &str = "surfaces go straight on from key to key";
 const TURNING: &str = "outlines turn on their way from key to key";
+/// What closer keys have to gain there, dB: they take time in every frame.
+const TIME: f64 = 0.2;
+/// Frames between keys, at least, where nothing bends: keys closer than that take more of every frame's time than all else.
+const CLOSEST: u32 = 4;
 /// Steps tried where positions bend, at most: fast turns want keys much closer.
 const BENT_TRIES: usize = 4;
 
@@ -89,20 +93,24 @@ pub(crate) fn choose(
     let Some((climbs, why)) = climbs(usual.settings.cell, all) else { return Ok((usual, None)) };
     let picture = usual.picture(flat);
     let free = Free { cell: true, interval: true, lambda: false, time: false, space: false, frames: scene.playback.frames };
-    let mut better: Option<Made> = None;
+    let mut better: Option<(f64, Made)> = None;
     let most: usize = climbs.iter().map(|(_, tries)| tries).sum();
     let mut tried = 0;
     for &(steps, tries) in climbs {
         climb((usual.settings, usual.worth(picture)), &free, steps, tries, |settings| {
+            let closer = settings.key_interval < usual.settings.key_interval && all.path_error_texels.p99 < BENT;
+            if closer && settings.key_interval < CLOSEST {
+                return Ok(None);
+            }
             progress("trying other cells", f64::from(tried) / most as f64);
             tried += 1;
             let made = Made::new(scene, flat, *settings)?;
             let [before, after] = [&usual, &made].map(|made| made.quality.wrong_surface_percent);
             let flickers =
                 all.wrong_surface_percent < TORN && settings.key_interval > usual.settings.key_interval && after > FLICKER * before;
-            let worth = if flickers { f64::NEG_INFINITY } else { made.worth(picture) };
-            if worth > better.as_ref().unwrap_or(&usual).worth(picture) {
-                better = Some(made);
+            let worth = if flickers { f64::NEG_INFINITY } else { made.worth(picture) - if closer { TIME } else { 0.0 } };
+            if worth > better.as_ref().map_or(usual.worth(picture), |&(most, _)| most) {
+                better = Some((worth, made));
             }
             Ok(Some(worth))
         })?;
@@ -110,7 +118,7 @@ pub(crate) fn choose(
             break;
         }
     }
-    let Some(better) = better else { return Ok((usual, None)) };
+    let Some((_, better)) = better else { return Ok((usual, None)) };
     let why = if why == STEADILY && better.settings.key_interval < usual.settings.key_interval { TURNING } else { why };
     let other = Other { why, usual: usual.settings, told: usual.told() };
     Ok((better, Some(other)))
