@@ -139,7 +139,7 @@ mod tests {
     }
 
     fn chosen(scene: &Scene, flat: &Flat, usual: Made) -> (Made, Option<Other>) {
-        let all = usual.quality.clone();
+        let all = usual.quality;
         choose(scene, flat, usual, &all, &|_, _| {}).unwrap()
     }
 

@@ -225,7 +225,7 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
     let quality = verify::against_exact(&encoded.bundle, &flat.atlas, &|d, n| progress("comparing with exact rays", part(d, n)))?;
     let (exact_seconds, finer_start) = (exact_start.elapsed().as_secs_f64(), Instant::now());
     let free = options.goal == Goal::AsSet && options.cell.is_none() && options.key_interval.is_none();
-    let all = quality.clone();
+    let all = quality;
     let made = Made { settings, encoded, quality };
     // Searches have left out what they could.
     let prunes = !options.all_sheets && options.goal == Goal::AsSet;
