@@ -165,7 +165,7 @@ fn covers(image: &SourceImage, label: u8, [u, v]: [f32; 2]) -> bool {
     if !(u >= left && u < right && v >= top && v < bottom) {
         return false;
     }
-    !label.masked || image.covered[v as usize * image.width as usize + u as usize]
+    !label.masked || image.covered_at([u, v])
 }
 
 /// The tests and the cost of an order: each sheet's test is chosen of `candidates` in turn, front to back.

@@ -3,6 +3,7 @@
 
 use crate::atlas::SourceImage;
 use crate::gbuffer::GBuffer;
+use crate::metrics::mean_squared_error;
 use crate::sheets::{KeyGrid, Sheets};
 use crate::spare::DOUBLE;
 use rayon::prelude::*;
@@ -127,18 +128,13 @@ fn losses(gbuffer: &GBuffer, image: &SourceImage, grid: &KeyGrid, index: usize, 
             loss.pixels += 1;
             loss.error += instead.map_or(LOST, |(far, [edge, further])| {
                 let on = [0, 1].map(|k| edge[k] + (edge[k] - further[k]) * f32::from(far));
-                let error = difference(image.colour_at(uv), image.colour_at(on));
+                let error = mean_squared_error(&image.colour_at(uv), &image.colour_at(on)) as f32;
                 // Beyond its chart it shows only where nothing else is left to be seen.
                 if list.len() > 2 && !image.covered_at(on) { error.max(LOST) } else { error }
             });
         }
     }
     losses
-}
-
-/// The squared difference of two colours, mean of the components.
-fn difference(a: [u8; 3], b: [u8; 3]) -> f32 {
-    a.into_iter().zip(b).map(|(a, b)| f32::from(a.abs_diff(b)).powi(2)).sum::<f32>() / 3.0
 }
 
 /// What a layer of `label` takes, in layers: label 0 is the backdrop.
@@ -153,7 +149,7 @@ impl Users {
     fn new(grid: &KeyGrid, sheets: &Sheets) -> Self {
         let mut users = Self(vec![Vec::new(); grid.keys.len() * grid.grid.nodes()]);
         for (index, list) in sheets.lists.iter().enumerate() {
-            for at in corners(grid, index) {
+            for at in grid.carriers(index) {
                 for &label in list {
                     match users.0[at].iter_mut().find(|(known, _)| *known == label) {
                         Some((_, count)) => *count += 1,
@@ -173,23 +169,16 @@ impl Users {
     /// What the sheet of `label` in cell and interval `index` takes: its share of its layers, and its place in the list.
     fn layers_of(&self, grid: &KeyGrid, index: usize, label: u8) -> f32 {
         let share = |at: usize| self.0[at].iter().find(|(known, _)| *known == label).map_or(0.0, |&(_, count)| 1.0 / count as f32);
-        LISTED + takes(label) * corners(grid, index).map(share).sum::<f32>()
+        LISTED + takes(label) * grid.carriers(index).map(share).sum::<f32>()
     }
 
     /// The sheet of `label` in cell and interval `index` is left out.
     fn leave(&mut self, grid: &KeyGrid, index: usize, label: u8) {
-        for at in corners(grid, index) {
+        for at in grid.carriers(index) {
             self.0[at].iter_mut().filter(|(known, _)| *known == label).for_each(|(_, count)| *count -= 1);
             self.0[at].retain(|&(_, count)| count > 0);
         }
     }
-}
-
-/// The nodes around cell and interval `index` at both of its keys: key times nodes plus node.
-fn corners(grid: &KeyGrid, index: usize) -> impl Iterator<Item = usize> + use<> {
-    let (interval, cell) = (index / grid.grid.cells(), index % grid.grid.cells());
-    let (corners, nodes) = (grid.corners(cell), grid.grid.nodes());
-    [interval, grid.second_key(interval)].into_iter().flat_map(move |key| corners.map(|node| key * nodes + node))
 }
 
 #[cfg(test)]

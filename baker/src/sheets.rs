@@ -123,6 +123,14 @@ impl KeyGrid {
         [node, node + 1, node + width, node + width + 1]
     }
 
+    /// The nodes around cell and interval `index` (the interval times the cells of the grid, plus the cell) at both of its keys: the key times the nodes
+    /// of the grid, plus the node.
+    pub(crate) fn carriers(&self, index: usize) -> impl Iterator<Item = usize> + use<> {
+        let (interval, cell) = (index / self.grid.cells(), index % self.grid.cells());
+        let (corners, nodes) = (self.corners(cell), self.grid.nodes());
+        [interval, self.second_key(interval)].into_iter().flat_map(move |key| corners.map(|node| key * nodes + node))
+    }
+
     /// Calls `f` with the index into the G-buffer and the position in the cell (across and down, 0..1) of every pixel
     /// that a cell shows in `frame`.
     pub fn each_pixel(&self, frame: u32, cell: usize, mut f: impl FnMut(usize, [f32; 2])) {
@@ -196,13 +204,10 @@ type Counted = Vec<(u8, u32)>;
 /// Takes the least seen labels out of the cells around nodes that would have to carry more than the format lets them: what it leaves out of a
 /// node by itself is the highest labels, however much shows them. Gives the number of pixels that showed what is left out.
 fn thin(found: &mut [Counted], grid: &KeyGrid) -> u64 {
-    let (cells, nodes) = (grid.grid.cells(), grid.grid.nodes());
-    let mut around: Vec<Vec<usize>> = vec![Vec::new(); grid.keys.len() * nodes];
+    let mut around: Vec<Vec<usize>> = vec![Vec::new(); grid.keys.len() * grid.grid.nodes()];
     for index in 0..found.len() {
-        for key in [index / cells, grid.second_key(index / cells)] {
-            for node in grid.corners(index % cells) {
-                around[key * nodes + node].push(index);
-            }
+        for at in grid.carriers(index) {
+            around[at].push(index);
         }
     }
     let mut dropped = 0;
@@ -252,17 +257,13 @@ impl Layers {
     /// The layers that `sheets` ask for.
     #[must_use]
     pub fn of(grid: &KeyGrid, sheets: &Sheets) -> Self {
-        let (cells, nodes) = (grid.grid.cells(), grid.grid.nodes());
-        let mut sets: Vec<Vec<u8>> = vec![Vec::new(); grid.keys.len() * nodes];
+        let mut sets: Vec<Vec<u8>> = vec![Vec::new(); grid.keys.len() * grid.grid.nodes()];
         for (index, list) in sheets.lists.iter().enumerate() {
-            let (interval, cell) = (index / cells, index % cells);
-            for key in [interval, grid.second_key(interval)] {
-                for node in grid.corners(cell) {
-                    let set = &mut sets[key * nodes + node];
-                    for &label in list {
-                        if let Err(at) = set.binary_search(&label) {
-                            set.insert(at, label);
-                        }
+            for at in grid.carriers(index) {
+                let set = &mut sets[at];
+                for &label in list {
+                    if let Err(at) = set.binary_search(&label) {
+                        set.insert(at, label);
                     }
                 }
             }
