@@ -35,6 +35,8 @@ pub struct Element {
 
 /// The pixels that an element is fitted to.
 enum Pixels {
+    /// None: outlines are asked for by torn cells alone.
+    None,
     /// The same ones in every frame, and all nodes' keys weigh the same: the products of the keys' weights, summed over the frames.
     Same(Sums, [[f32; 4]; 4]),
     /// Those of each frame.
@@ -126,6 +128,7 @@ impl Element {
         let first = self.ways.first().map_or(0, |way| way[0]);
         let alike = self.ways.iter().all(|way| way[0] == first) && sums.windows(2).all(|pair| pair[0] == pair[1]);
         self.pixels = match sums.first() {
+            _ if sums.iter().all(|&sums| sums == Sums::default()) => Pixels::None,
             Some(&same) if alike => {
                 let mut products = [[0.0; 4]; 4];
                 for weights in frames.iter().map(|weights| weights[usize::from(first)]) {
@@ -143,12 +146,22 @@ impl Element {
 
     /// Adds the element's share of the product A x to `y`, given the keys' weights in every frame of its interval.
     pub fn multiply(&self, weights: &[Weights], x: &[[f64; 2]], y: &mut [[f64; 2]]) {
-        let value = |layer: u32| if layer == NOWHERE { [0.0; 2] } else { x[layer as usize].map(|x| x as f32) };
+        if !matches!(self.pixels, Pixels::None) {
+            self.multiply_pixels(weights, x, y);
+        }
+        let corner = |bits: usize| self.layer[CORNERS[bits & 3]][1 + (bits >> 2)];
+        let held = regularised(self.volume, &std::array::from_fn(|bits| value(x, corner(bits))));
+        held.into_iter().enumerate().for_each(|(bits, value)| give(y, corner(bits), value));
+    }
+
+    /// Adds the share of its pixels.
+    fn multiply_pixels(&self, weights: &[Weights], x: &[[f64; 2]], y: &mut [[f64; 2]]) {
         let (mut values, mut back) = ([[[0.0; 2]; VALUES]; 16], [[[0.0; 2]; VALUES]; 16]);
         for (values, way) in values.iter_mut().zip(&self.ways) {
-            *values = self.stencil.values(&std::array::from_fn(|node| value(self.of(*way, node))));
+            *values = self.stencil.values(&std::array::from_fn(|node| value(x, self.of(*way, node))));
         }
         match &self.pixels {
+            Pixels::None => {}
             Pixels::Same(sums, products) => {
                 for (back, to) in back.iter_mut().zip(&self.ways) {
                     let mut mixed = Values::default();
@@ -172,25 +185,31 @@ impl Element {
                 }
             }
         }
-        let mut give = |layer: u32, [u, v]: [f32; 2]| {
-            if layer != NOWHERE {
-                let y = &mut y[layer as usize];
-                (y[0], y[1]) = (y[0] + f64::from(u), y[1] + f64::from(v));
-            }
-        };
         for (back, way) in back.iter().zip(&self.ways) {
             let nodes = self.stencil.transposed(back);
-            nodes.into_iter().enumerate().for_each(|(node, value)| give(self.of(*way, node), value));
+            nodes.into_iter().enumerate().for_each(|(node, value)| give(y, self.of(*way, node), value));
         }
-        let corner = |bits: usize| self.layer[CORNERS[bits & 3]][1 + (bits >> 2)];
-        let held = regularised(self.volume, &std::array::from_fn(|bits| value(corner(bits))));
-        held.into_iter().enumerate().for_each(|(bits, value)| give(corner(bits), value));
     }
 
     /// The layer of a node in a way's key, if the node has the way's weights.
     #[inline]
     fn of(&self, [set, key]: [u8; 2], node: usize) -> u32 {
         if self.set[node] == set { self.layer[node][usize::from(key)] } else { NOWHERE }
+    }
+}
+
+/// What `x` has of a layer; zeros where there is none.
+#[inline]
+fn value(x: &[[f64; 2]], layer: u32) -> [f32; 2] {
+    if layer == NOWHERE { [0.0; 2] } else { x[layer as usize].map(|x| x as f32) }
+}
+
+/// Adds to what `y` has of a layer, if there is one.
+#[inline]
+fn give(y: &mut [[f64; 2]], layer: u32, [u, v]: [f32; 2]) {
+    if layer != NOWHERE {
+        let y = &mut y[layer as usize];
+        (y[0], y[1]) = (y[0] + f64::from(u), y[1] + f64::from(v));
     }
 }
 

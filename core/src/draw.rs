@@ -11,6 +11,7 @@ use crate::plan::Plan;
 use crate::site::{BLOCK_LOG2, Site};
 use crate::span::{self, Packed, Span, Tiles};
 use crate::torn::{Mixed, Side};
+use crate::window::Line;
 use crate::work::{Probe, Work};
 
 /// What pixels are made of positions.
@@ -27,8 +28,8 @@ pub trait Paint {
     /// The pixel at `uv`, which is inside the picture; `x`: whether it is an odd one of its row.
     fn at(&self, uv: PlayUv, label: u8, x: usize) -> Self::Pixel;
 
-    /// A row of tiles, in windows of 2^ROWS rows of 2^WIDTH texels, `TEXELS` in all.
-    fn tiles<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, tiles: &Tiles<'_>, out: &mut [Self::Pixel]);
+    /// A row of tiles, in windows of 2^ROWS rows of 2^WIDTH texels, `TEXELS` in all; with what is beside the last of them, `MORE`.
+    fn tiles<const WIDTH: u32, const ROWS: u32, const TEXELS: usize, const MORE: usize>(&self, tiles: &Tiles<'_>, out: &mut [Self::Pixel]);
 
     /// What row `row` of a mixed block shows of one of its sides, in such a window: the pixels that `shown` names, a bit each.
     fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, row: u32, shown: u32, out: &mut [Self::Pixel]);
@@ -47,7 +48,7 @@ impl Paint for Probes {
         Probe { label, at: uv }
     }
 
-    fn tiles<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, tiles: &Tiles<'_>, out: &mut [Probe]) {
+    fn tiles<const WIDTH: u32, const ROWS: u32, const TEXELS: usize, const MORE: usize>(&self, tiles: &Tiles<'_>, out: &mut [Probe]) {
         match tiles.log2 {
             3 => probe::<WIDTH, ROWS, 8>(tiles, out),
             _ => probe::<WIDTH, ROWS, 4>(tiles, out),
@@ -67,9 +68,11 @@ fn probe<const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(tiles: &Tiles<'
     let backdrop = |uv, _| Probe { label: BACKDROP as u8, at: uv };
     for (tile, pixels) in tiles.tiles.iter().zip(out.as_chunks_mut::<PIXELS>().0) {
         let window = |row: u16| Some(row).filter(|_| tile.in_window());
-        let make = |row: u16, at: Packed<WIDTH, ROWS>| Probe { label: tile.label, at: at.at(row) };
+        let along = |row: u16, pixels: &mut [Probe; PIXELS], line: Line| {
+            span::along(pixels, line, |at: Packed<WIDTH, ROWS>| Probe { label: tile.label, at: at.at(row) });
+        };
         let one = Tiles { tiles: core::slice::from_ref(tile), ..*tiles };
-        one.paint::<_, _, WIDTH, ROWS, PIXELS, true>(pixels, [0; 2], window, make, backdrop);
+        one.paint::<_, _, PIXELS, true>(pixels, window, along, backdrop);
     }
 }
 
@@ -225,10 +228,10 @@ fn pixels<T>(block: u32, row: &mut [T], log2: u32) -> Option<&mut [T]> {
 #[inline(always)]
 fn by_width<P: Paint>(paint: &P, tiles: &Tiles<'_>, out: &mut [P::Pixel], width_log2: u32) {
     match width_log2 {
-        7 => paint.tiles::<7, 7, 0x4000>(tiles, out),
-        8 => paint.tiles::<8, 6, 0x4000>(tiles, out),
-        9 => paint.tiles::<9, 6, 0x8000>(tiles, out),
-        _ => paint.tiles::<10, 4, 0x4000>(tiles, out),
+        7 => paint.tiles::<7, 7, 0x4000, 0x4081>(tiles, out),
+        8 => paint.tiles::<8, 6, 0x4000, 0x4101>(tiles, out),
+        9 => paint.tiles::<9, 6, 0x8000, 0x8201>(tiles, out),
+        _ => paint.tiles::<10, 4, 0x4000, 0x4401>(tiles, out),
     }
 }
 

@@ -10,7 +10,7 @@ use crate::row::{Layer, Place};
 use crate::sheet::{Sheet, Stretch};
 use crate::site::Site;
 use crate::torn::{self, Mixed, Shown, Side};
-use crate::window::{self, Middle, Room, Tile};
+use crate::window::{Middle, Room, Tile};
 use core::slice;
 
 /// A strip's blocks, in caller's memory.
@@ -59,7 +59,7 @@ impl Plan<'_> {
         (self.strip, self.reach, self.sideless) = (Some(strip), reach, sideless);
         self.backdrop = site.backdrop();
         let (texture, log2) = (site.bundle.texture(), site.block_log2());
-        let room = Room::new(texture.width_log2, texture.height, window::margin(log2).wrapping_add(reach));
+        let room = Room::new(texture.width_log2, texture.height, log2, reach);
         let blocks = 1u32.wrapping_shl(site.log2().wrapping_sub(log2));
         let mut across = Across { site, room, strip, log2, blocks, width: site.bundle.size().0, left: 0, block: 0 };
         for &stretch in site.sheets.stretches() {

@@ -54,16 +54,14 @@ pub struct Tiles<'t> {
 }
 
 impl Tiles<'_> {
-    /// Paints `out`, tiles of `PIXELS` pixels each. `window` gives the texels of that from some row on, of which `make` turns a position into a pixel, once
-    /// it is moved by one of `offsets` where the pixel is an even or an odd one of its row; `at` one anywhere in the picture. Where they bend
-    /// nowhere across, `BENT` may be false.
+    /// Paints `out`, tiles of `PIXELS` pixels each. `window` gives the texels of that from some row on, in which `along` paints a line of pixels; `at`
+    /// paints one from anywhere in the picture. Where they bend nowhere across, `BENT` may be false.
     #[inline(always)]
-    pub fn paint<T: Copy, W: Copy, const WIDTH: u32, const ROWS: u32, const PIXELS: usize, const BENT: bool>(
+    pub fn paint<T: Copy, W: Copy, const PIXELS: usize, const BENT: bool>(
         &self,
         out: &mut [T],
-        offsets: [u32; 2],
         window: impl Fn(u16) -> Option<W>,
-        make: impl Fn(W, Packed<WIDTH, ROWS>) -> T,
+        along: impl Fn(W, &mut [T; PIXELS], Line),
         at: impl Fn(PlayUv, usize) -> T,
     ) {
         let (mut tiles, mut blocks) = (self.tiles, out.as_chunks_mut::<PIXELS>().0.iter_mut());
@@ -80,27 +78,45 @@ impl Tiles<'_> {
             // The last tile may reach past the end.
             for (tile, pixels) in here.iter().zip(blocks.by_ref()) {
                 let [at, step, bend] = tile.row(self.row);
-                alternate(pixels, [at, step, if BENT { bend } else { 0 }], offsets, |at| make(window, at));
+                along(window, pixels, [at, step, if BENT { bend } else { 0 }]);
             }
         }
     }
 }
 
-/// Paints `pixels` along a line, moved by one of the offsets in turn.
+/// Paints `pixels` along a line; `make` turns a position into one.
 #[inline(always)]
-fn alternate<T, const WIDTH: u32, const ROWS: u32>(
+pub fn along<T, const WIDTH: u32, const ROWS: u32>(
     pixels: &mut [T],
     [mut at, mut step, bend]: Line,
-    [even, odd]: [u32; 2],
     make: impl Fn(Packed<WIDTH, ROWS>) -> T,
 ) {
-    for (x, pixel) in pixels.iter_mut().enumerate() {
-        *pixel = make(Packed(at.wrapping_add(if x & 1 == 0 { even } else { odd })));
+    for pixel in pixels {
+        *pixel = make(Packed(at));
         (at, step) = (at.wrapping_add(step), step.wrapping_add(bend));
     }
 }
 
-/// Paints those of `pixels`, row `row` of `tile`, that `shown` names, a bit each, like [`Tiles::paint`].
+/// Likewise, positions moved by one of the offsets in turn.
+#[inline(always)]
+pub fn by_turns<T, const WIDTH: u32, const ROWS: u32>(
+    pixels: &mut [T],
+    [at, step, bend]: Line,
+    [even, odd]: [u32; 2],
+    make: impl Fn(Packed<WIDTH, ROWS>) -> T,
+) {
+    // Even and odd pixels each go on by two steps at a time: an offset for each pixel would take an addition more.
+    let (mut first, mut second) = (at.wrapping_add(even), at.wrapping_add(step).wrapping_add(odd));
+    let (mut two, bends) = (step.wrapping_mul(2).wrapping_add(bend), bend.wrapping_mul(2));
+    for pair in pixels.as_chunks_mut::<2>().0 {
+        *pair = [make(Packed(first)), make(Packed(second))];
+        first = first.wrapping_add(two);
+        second = second.wrapping_add(two.wrapping_add(bends));
+        two = two.wrapping_add(bends.wrapping_mul(2));
+    }
+}
+
+/// Paints those of `pixels`, row `row` of `tile`, that `shown` names, a bit each, moved by one of the offsets in turn.
 #[inline(always)]
 pub fn part<T, const WIDTH: u32, const ROWS: u32>(
     tile: &Tile,

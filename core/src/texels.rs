@@ -22,6 +22,7 @@ use crate::pack::{self, Picture, Scratch};
 use crate::playing::{Look, Playing};
 use crate::span::{self, Packed, Tiles};
 use crate::torn::Side;
+use crate::window::{BESIDE, Line};
 
 /// A kind of texels, or several, that a [`crate::Player`] plays: [`Indexed8`], [`Indexed4`], [`Direct565`] or [`AnyTexels`].
 pub trait Texels: Source {}
@@ -160,7 +161,12 @@ trait Colours {
     fn colour(&self, index: usize) -> u16;
 
     /// A row of tiles, as [`Paint::tiles`] has it.
-    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, filter: F, tiles: &Tiles<'_>, out: &mut [u16]);
+    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize, const MORE: usize>(
+        &self,
+        filter: F,
+        tiles: &Tiles<'_>,
+        out: &mut [u16],
+    );
 }
 
 /// Colours looked up by way of a filter.
@@ -180,8 +186,8 @@ impl<C: Colours, F: Filter> Paint for Lookup<C, F> {
     }
 
     #[inline(always)]
-    fn tiles<const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, tiles: &Tiles<'_>, out: &mut [u16]) {
-        self.colours.tiles::<F, WIDTH, ROWS, TEXELS>(self.filter, tiles, out);
+    fn tiles<const WIDTH: u32, const ROWS: u32, const TEXELS: usize, const MORE: usize>(&self, tiles: &Tiles<'_>, out: &mut [u16]) {
+        self.colours.tiles::<F, WIDTH, ROWS, TEXELS, MORE>(self.filter, tiles, out);
     }
 
     #[inline(always)]
@@ -221,12 +227,25 @@ impl Colours for Colours8<'_> {
 
     // A function of its own: the loop needs all registers.
     #[inline(never)]
-    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, filter: F, tiles: &Tiles<'_>, out: &mut [u16]) {
+    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize, const MORE: usize>(
+        &self,
+        filter: F,
+        tiles: &Tiles<'_>,
+        out: &mut [u16],
+    ) {
         // The plan keeps windows inside the picture.
-        let window = |row: u16| self.texture.texels.get(usize::from(row).wrapping_shl(WIDTH)..).and_then(<[u8]>::first_chunk::<TEXELS>);
-        paint::<_, _, _, WIDTH, ROWS>(self, filter, tiles, out, window, |window, index| {
-            self.entry(window.get(index & TEXELS.wrapping_sub(1)).copied().unwrap_or(0))
-        });
+        let from = |row: u16| self.texture.texels.get(usize::from(row).wrapping_shl(WIDTH)..);
+        if F::REACH < BESIDE {
+            let window = |row| from(row).and_then(<[u8]>::first_chunk::<TEXELS>);
+            paint::<_, _, _, WIDTH, ROWS>(self, filter, tiles, out, window, |window, index| {
+                self.entry(window.get(index).copied().unwrap_or(0))
+            });
+        } else {
+            let window = |row| from(row).and_then(<[u8]>::first_chunk::<MORE>);
+            paint::<_, _, _, WIDTH, ROWS>(self, filter, tiles, out, window, |window, index| {
+                self.entry(window.get(index).copied().unwrap_or(0))
+            });
+        }
     }
 }
 
@@ -241,13 +260,14 @@ fn paint<C: Colours, F: Filter, W: Copy, const WIDTH: u32, const ROWS: u32>(
     colour: impl Fn(W, usize) -> u16,
 ) {
     let at = |uv, x| filter.at(uv, x, colours.texture(), |index| colours.colour(index));
-    let offsets = filter.offsets(WIDTH);
-    let make = |window: W, at: Packed<WIDTH, ROWS>| filter.packed(at, |index| colour(window, index));
+    let along = |window: W, pixels: &mut [u16], line: Line| {
+        filter.along(pixels, line, |at: Packed<WIDTH, ROWS>| filter.packed(at, |index| colour(window, index)));
+    };
     // Cells of four pixels are rare; most pictures are 512 texels wide, and those of models 128.
     match (tiles.log2, WIDTH, tiles.straight) {
-        (3, 7 | 9, true) => tiles.paint::<_, W, WIDTH, ROWS, 8, false>(out, offsets, window, make, at),
-        (3, ..) => tiles.paint::<_, W, WIDTH, ROWS, 8, true>(out, offsets, window, make, at),
-        _ => tiles.paint::<_, W, WIDTH, ROWS, 4, true>(out, offsets, window, make, at),
+        (3, 7 | 9, true) => tiles.paint::<_, W, 8, false>(out, window, |window, pixels, line| along(window, pixels, line), at),
+        (3, ..) => tiles.paint::<_, W, 8, true>(out, window, |window, pixels, line| along(window, pixels, line), at),
+        _ => tiles.paint::<_, W, 4, true>(out, window, |window, pixels, line| along(window, pixels, line), at),
     }
 }
 
@@ -307,7 +327,12 @@ impl Colours for Colours4<'_> {
     }
 
     #[inline(never)]
-    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, filter: F, tiles: &Tiles<'_>, out: &mut [u16]) {
+    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize, const MORE: usize>(
+        &self,
+        filter: F,
+        tiles: &Tiles<'_>,
+        out: &mut [u16],
+    ) {
         // Half of TEXELS, which is one of two numbers.
         match TEXELS {
             0x4000 => self.window::<_, WIDTH, ROWS, 0x2000>(filter, tiles, out),
@@ -361,7 +386,12 @@ impl Colours for ColoursDirect<'_> {
     }
 
     #[inline(never)]
-    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, filter: F, tiles: &Tiles<'_>, out: &mut [u16]) {
+    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize, const MORE: usize>(
+        &self,
+        filter: F,
+        tiles: &Tiles<'_>,
+        out: &mut [u16],
+    ) {
         let texels = self.texture.texels.as_chunks::<2>().0;
         let window = |row: u16| texels.get(usize::from(row).wrapping_shl(WIDTH)..).and_then(<[[u8; 2]]>::first_chunk::<TEXELS>);
         // A loop for either order of bytes.
@@ -425,11 +455,16 @@ impl Colours for AnyColours<'_> {
         }
     }
 
-    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(&self, filter: F, tiles: &Tiles<'_>, out: &mut [u16]) {
+    fn tiles<F: Filter, const WIDTH: u32, const ROWS: u32, const TEXELS: usize, const MORE: usize>(
+        &self,
+        filter: F,
+        tiles: &Tiles<'_>,
+        out: &mut [u16],
+    ) {
         match self {
-            Self::Eight(colours) => colours.tiles::<F, WIDTH, ROWS, TEXELS>(filter, tiles, out),
-            Self::Four(colours) => colours.tiles::<F, WIDTH, ROWS, TEXELS>(filter, tiles, out),
-            Self::Direct(colours) => colours.tiles::<F, WIDTH, ROWS, TEXELS>(filter, tiles, out),
+            Self::Eight(colours) => colours.tiles::<F, WIDTH, ROWS, TEXELS, MORE>(filter, tiles, out),
+            Self::Four(colours) => colours.tiles::<F, WIDTH, ROWS, TEXELS, MORE>(filter, tiles, out),
+            Self::Direct(colours) => colours.tiles::<F, WIDTH, ROWS, TEXELS, MORE>(filter, tiles, out),
         }
     }
 }

@@ -269,11 +269,18 @@ pub struct Room {
     last: i32,
 }
 
+/// From this reach on, Q16 texels, pixels are told from texels beside that of their position too.
+pub const BESIDE: i32 = 1 << 15;
+
 impl Room {
-    /// That of windows in a picture 2^`width_log2` texels wide and `height` high; `None` where it has none.
+    /// That of windows in a picture 2^`width_log2` texels wide and `height` high, for tiles of 2^`log2` pixels, which are told from as far as `reach` around a
+    /// position, Q16 texels; `None` where it has none.
     #[must_use]
-    pub const fn new(width_log2: u32, height: u32, margin: i32) -> Option<Self> {
+    pub const fn new(width_log2: u32, height: u32, log2: u32, reach: i32) -> Option<Self> {
+        // Below a window there is a row and a texel more, so that where the texels beside one stand need not be looked at.
+        let height = if reach < BESIDE { height } else { height.saturating_sub(2) };
         let Some(window) = Window::new(width_log2, height) else { return None };
+        let margin = margin(log2).wrapping_add(reach);
         let right = 1i32.wrapping_shl(window.width_log2.wrapping_add(16)).wrapping_sub(margin);
         let last = height.wrapping_sub(1u32.wrapping_shl(window.rows_log2)) as i32;
         Some(Self { window, margin, right, last })
@@ -321,6 +328,6 @@ impl Room {
 /// them by less. All numbers of a tile of n pixels are off by up to half a unit in its middle, 1/512 texel at most: in a corner by n^2 / 4 units, and
 /// n and a bit more.
 #[must_use]
-pub const fn margin(log2: u32) -> i32 {
+const fn margin(log2: u32) -> i32 {
     1i32.wrapping_shl(log2.wrapping_mul(2).wrapping_add(7))
 }

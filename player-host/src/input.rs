@@ -1,7 +1,7 @@
 //! What the user gave, as a bundle: read from a file, or baked from a scene.
 //! A path comes in from `cli`; checked bytes go to the commands.
 
-use crate::bake::{Baked, Scene, bake};
+use crate::bake::{Baked, DEMO, Scene, bake};
 use crate::cli::Usage;
 use crate::progress::progress;
 use anyhow::{Context, Result, anyhow};
@@ -10,8 +10,6 @@ use cubist_baker::terminal::tell;
 use cubist_core::Bundle;
 use std::path::Path;
 
-/// The scene that plays when nothing is given.
-const DEMO: &str = "street";
 /// Endings of files that are baked rather than played.
 const SCENES: [&str; 5] = ["toml", "glb", "gltf", "obj", "ply"];
 
@@ -28,7 +26,7 @@ pub struct Loaded {
 /// Reads a bundle, or bakes a scene (told by its ending), or bakes the demo when `path` is none.
 pub fn load(path: Option<&Path>) -> Result<Loaded> {
     let Some(path) = path else {
-        return baked(DEMO.to_owned(), Scene::Builtin(DEMO));
+        return baked(DEMO.to_owned(), Scene::Demo);
     };
     let name = path.display().to_string();
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());

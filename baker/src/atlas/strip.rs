@@ -52,7 +52,9 @@ pub(super) struct Strip {
     most: u32,
     /// Texels between masks.
     gutter: u32,
-    /// Rows up to the last that holds something.
+    /// Texels around all of them: a player that looks at texels around a position finds some on every side.
+    rim: u32,
+    /// Rows up to the last that holds something, and the rim.
     pub height: u32,
     /// Levels a row has.
     levels: usize,
@@ -66,7 +68,17 @@ impl Strip {
     /// An empty strip, `width` texels wide, a power of two up to 1024.
     pub fn new(width: u32, most: u32, gutter: u32) -> Self {
         let levels = width.ilog2() as usize + 1;
-        Self { width, most, gutter, height: 0, levels, taken: vec![[0; WORDS]; levels * most as usize], free: vec![width; most as usize] }
+        let rim = gutter.min(1);
+        Self {
+            width,
+            most,
+            gutter,
+            rim,
+            height: 0,
+            levels,
+            taken: vec![[0; WORDS]; levels * most as usize],
+            free: vec![width; most as usize],
+        }
     }
 
     /// Lays down one of the turns of a mask, where the strip grows least, then where it is highest, then leftmost.
@@ -85,16 +97,17 @@ impl Strip {
 
     /// The best spot of a shape, if it is better than one that ends the strip at, and has its y and x at, `bound`.
     fn find(&self, shape: &Shape, bound: Option<(u32, u32, u32)>) -> Option<(u32, Spot)> {
-        let last = self.most.checked_sub(shape.height)?;
-        let right = self.width.checked_sub(shape.width)?;
+        let rim = self.rim;
+        let last = self.most.checked_sub(shape.height + rim)?;
+        let right = self.width.checked_sub(shape.width + rim)?;
         // What has no texels lies anywhere.
         let longest = shape.runs.first().copied().unwrap_or(Run { row: 0, start: 0, length: 0 });
         let words = self.width as usize / 64;
         // A set bit is a column that the shape's left edge cannot lie in.
         let mut outside = [u64::MAX; WORDS];
-        (0..=right).for_each(|x| outside[x as usize / 64] &= !(1 << (x % 64)));
-        for y in 0..=last {
-            let end = (y + shape.height).max(self.height);
+        (rim..=right).for_each(|x| outside[x as usize / 64] &= !(1 << (x % 64)));
+        for y in rim..=last {
+            let end = (y + shape.height + rim).max(self.height);
             if bound.is_some_and(|(e, by, _)| (end, y) > (e, by)) {
                 return None;
             }
@@ -141,7 +154,7 @@ impl Strip {
             }
             self.free[y as usize] = longest_free(&row[0][..words], self.width);
         }
-        self.height = self.height.max(spot.y + shape.height);
+        self.height = self.height.max(spot.y + shape.height + self.rim);
     }
 }
 
@@ -209,12 +222,12 @@ mod tests {
     #[test]
     fn holes_are_filled() {
         // A ring has room for what fits into it, gutter and all.
-        let mut ring = Mask::new(64, 64);
-        let inside = |x: u32| (8..56).contains(&x);
-        (0..64).for_each(|y| (0..64).filter(|&x| !inside(x) || !inside(y)).for_each(|x| ring.set(x, y)));
-        let (height, owner) = laid(&[ring.clone(), Mask::full(44, 44)], 64, 2);
-        assert_eq!((height, owner[10 * 64 + 10], owner[9 * 64 + 10]), (64, Some(1), None));
-        assert_eq!(laid(&[ring, Mask::full(45, 44)], 64, 2).0, 64 + 2 + 44);
+        let mut ring = Mask::new(62, 62);
+        let inside = |x: u32| (8..54).contains(&x);
+        (0..62).for_each(|y| (0..62).filter(|&x| !inside(x) || !inside(y)).for_each(|x| ring.set(x, y)));
+        let (height, owner) = laid(&[ring.clone(), Mask::full(42, 42)], 64, 2);
+        assert_eq!((height, owner[11 * 64 + 11], owner[10 * 64 + 11]), (64, Some(1), None));
+        assert_eq!(laid(&[ring, Mask::full(43, 42)], 64, 2).0, 1 + 62 + 2 + 42 + 1);
     }
 
     #[test]
@@ -261,6 +274,8 @@ mod tests {
             for y in 0..height {
                 for x in 0..width {
                     let Some(own) = owner[(y * width + x) as usize] else { continue };
+                    let rim = [x, y, width - 1 - x, height - 1 - y].contains(&0);
+                    prop_assert!(gutter == 0 || !rim, "{own} at {x}, {y} lies at the edge");
                     for j in y..=(y + gutter).min(height - 1) {
                         for i in x.saturating_sub(gutter)..=(x + gutter).min(width - 1) {
                             let other = owner[(j * width + i) as usize];
