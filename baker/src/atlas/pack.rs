@@ -26,6 +26,10 @@ const BACK: i32 = 40;
 const WINDOWED: u32 = 4096;
 /// Rows that an image may be given for that.
 const ROWS: [u32; 3] = [16, 64, 128];
+/// Rows that an image may be taller by for a texel between its edges and all charts.
+const RIM_ROWS: u32 = 4;
+/// Images of fewer rows than this are not: it would be too much of them.
+const SMALL: u32 = 128;
 /// Orders for searching a scale; all are tried at the scale found.
 const QUICK: usize = 3;
 /// Shuffled orders, fewer where there are many charts to lay down in each.
@@ -91,11 +95,11 @@ impl Items {
     }
 
     /// Lays everything down in order `order`; the height, and the spots.
-    fn lay(&self, order: usize, [width, height]: [u32; 2], gutter: u32) -> Option<(u32, Vec<Spot>)> {
+    fn lay(&self, order: usize, [width, height]: [u32; 2], [gutter, rim]: [u32; 2]) -> Option<(u32, Vec<Spot>)> {
         if self.area > u64::from(width) * u64::from(height) {
             return None;
         }
-        let mut strip = Strip::new(width, height, gutter);
+        let mut strip = Strip::new(width, height, gutter, rim);
         let mut spots = vec![Spot { x: 0, y: 0, turns: 0 }; self.shapes.len()];
         for &i in &self.orders[order] {
             spots[i] = strip.place(&self.shapes[i])?;
@@ -104,8 +108,8 @@ impl Items {
     }
 
     /// The spots in an image of this size, in the first of so many orders in which everything fits.
-    fn in_any_order(&self, orders: usize, size: [u32; 2], gutter: u32) -> Option<Vec<Spot>> {
-        (0..orders.min(self.orders.len())).into_par_iter().find_map_first(|order| self.lay(order, size, gutter)).map(|(_, spots)| spots)
+    fn in_any_order(&self, orders: usize, size: [u32; 2], apart: [u32; 2]) -> Option<Vec<Spot>> {
+        (0..orders.min(self.orders.len())).into_par_iter().find_map_first(|order| self.lay(order, size, apart)).map(|(_, spots)| spots)
     }
 
     /// The smallest image that one of the orders makes: its size, and the spots.
@@ -126,7 +130,7 @@ impl Items {
         let widths = (6..=side.ilog2()).rev().map(|log2| 1 << log2);
         let tries: Vec<(u32, usize)> = widths.flat_map(|width| orders.clone().map(move |order| (width, order))).collect();
         let of = |(i, &(width, order)): (usize, &(u32, usize))| {
-            let (height, spots) = self.lay(order, [width, most(width)], gutter)?;
+            let (height, spots) = self.lay(order, [width, most(width)], [gutter, 0])?;
             let height = height.next_multiple_of(4);
             let taller = ROWS.into_iter().filter(|&rows| rows > height && rows <= most(width));
             let size = std::iter::once(height).chain(taller).map(|height| [width, height]).min_by_key(|&size| worth(size))?;
@@ -209,7 +213,7 @@ impl Packing<'_> {
     /// Everything at least `gutter` texels apart.
     fn with(&self, mut gutter: u32) -> Option<Layout> {
         let [side, most] = self.room();
-        let fits = |scale: f64, gutter: u32| self.items(scale, false).in_any_order(QUICK, [side, most], gutter).is_some();
+        let fits = |scale: f64, gutter: u32| self.items(scale, false).in_any_order(QUICK, [side, most], [gutter, 0]).is_some();
         let mut scale = fit(|scale| fits(scale, gutter))?;
         if scale < 1.0 {
             if let Some(wide) = WIDE.into_iter().find(|&wide| gutter > 0 && fits(scale / WORTH, wide)) {
@@ -228,10 +232,17 @@ impl Packing<'_> {
         None
     }
 
-    /// Takes more room between charts where it is free: it keeps what is thought to lie beyond one from falling on another.
+    /// Takes more room around and between charts where it is free, or next to it: at the picture's edges players draw pixel by pixel, and what is thought to
+    /// lie beyond a chart should not fall on another.
     fn settled(&self, items: &Items, size: [u32; 2], spots: Vec<Spot>, scale: f64, gutter: u32) -> Layout {
+        let [width, height] = size;
+        let taller = height + RIM_ROWS;
+        let heights = [Some(height), Some(taller).filter(|_| height >= SMALL && taller <= self.room()[1])];
+        let mut sizes = heights.into_iter().flatten().filter(|_| gutter > 0).map(|height| [width, height]);
+        let rimmed = sizes.find_map(|size| Some((size, items.in_any_order(usize::MAX, size, [gutter, 1])?)));
+        let (rim, (size, spots)) = rimmed.map_or((0, (size, spots)), |found| (1, found));
         let mut wider = WIDE.into_iter().filter(|&wide| wide > gutter);
-        let found = wider.find_map(|wide| Some((wide, items.in_any_order(usize::MAX, size, wide)?)));
+        let found = wider.find_map(|wide| Some((wide, items.in_any_order(usize::MAX, size, [wide, rim])?)));
         let (gutter, spots) = found.unwrap_or((gutter, spots));
         finish(self.footprints.charting, &items.sizes, &spots, size, scale, gutter)
     }

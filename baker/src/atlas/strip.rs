@@ -66,9 +66,8 @@ pub(super) struct Strip {
 
 impl Strip {
     /// An empty strip, `width` texels wide, a power of two up to 1024.
-    pub fn new(width: u32, most: u32, gutter: u32) -> Self {
+    pub fn new(width: u32, most: u32, gutter: u32, rim: u32) -> Self {
         let levels = width.ilog2() as usize + 1;
-        let rim = gutter.min(1);
         Self {
             width,
             most,
@@ -204,7 +203,7 @@ mod tests {
 
     /// Lays masks down in turn; the strip's height and, of each texel, the mask that lies there.
     fn laid(masks: &[Mask], width: u32, gutter: u32) -> (u32, Vec<Option<usize>>) {
-        let mut strip = Strip::new(width, 1024, gutter);
+        let mut strip = Strip::new(width, 1024, gutter, gutter.min(1));
         let mut owner = vec![None; width as usize * 1024];
         for (i, m) in masks.iter().enumerate() {
             let spot = strip.place(&Shape::turns(m, true)).expect("room");
