@@ -303,8 +303,12 @@ fn warnings(origin: &Origin<'_>) -> Vec<String> {
         ));
     }
     if figures.charts + 1 > figures.labels {
+        let but = match figures.crowded {
+            0 => String::new(),
+            crowded => format!(", but for {crowded} that little is seen of, for want of labels; lower --size or simplify the scene"),
+        };
         out.push(format!(
-            "{} charts share {} labels: charts that are never seen near each other have one in common",
+            "{} charts share {} labels: charts that are never seen near each other have one in common{but}",
             figures.charts,
             figures.labels - 1
         ));

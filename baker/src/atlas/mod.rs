@@ -22,10 +22,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use thiserror::Error;
 
-/// The most labels a source image has, the background included.
-pub const MAX_LABELS: usize = 256;
-/// Labels beyond this are avoided by sharing them.
-const WANTED_LABELS: usize = 255;
+/// Charts share labels where there would be more than this, the background's included.
+const MOST_LABELS: usize = 255;
+/// Charts that a source image can have.
+const MOST_CHARTS: usize = 1 << 15;
 
 /// Frames whose keys take about as much as a source image. What a texel is worth is weighed against the whole bundle, and that of a path of few
 /// frames is hardly smaller.
@@ -45,12 +45,9 @@ pub enum AtlasError {
         /// The largest side allowed.
         side: u32,
     },
-    /// The scene is in more pieces than there are labels.
-    #[error("source image: the charts need {found} labels, expected at most {MAX_LABELS}; lower --size or simplify the scene")]
-    Labels {
-        /// Labels needed.
-        found: usize,
-    },
+    /// The scene is in more pieces than can be told apart.
+    #[error("source image: expected at most {MOST_CHARTS} charts, found {0}; lower --size or simplify the scene")]
+    Charts(usize),
 }
 
 /// How a bundle holds its source image.
@@ -187,6 +184,8 @@ pub struct Figures {
     pub halved: usize,
     /// Labels, the background included.
     pub labels: usize,
+    /// Charts that are seen near another one of their label, for want of others.
+    pub crowded: usize,
     /// Share of texels covered.
     pub fill: f64,
     /// The densities were multiplied by this to make everything fit; at most 1.
@@ -227,10 +226,10 @@ pub fn build(scene: &Scene, hits: &Hits, settings: &Settings, progress: &(dyn Fn
         chart::rewarp(hits, &mut charting);
     }
     progress(1, 4);
-    let (label_of, labels) = chart::assign(hits, &charting, WANTED_LABELS - 1);
-    if labels + 1 > MAX_LABELS {
-        return Err(AtlasError::Labels { found: labels + 1 });
+    if charting.charts.len() > MOST_CHARTS {
+        return Err(AtlasError::Charts(charting.charts.len()));
     }
+    let chart::Labels { of: label_of, count: labels, crowded } = chart::assign(hits, &charting, MOST_LABELS - 1);
     let layout = pack(&charting).ok_or(AtlasError::Room { charts: charting.charts.len(), side: settings.max_side })?;
     progress(2, 4);
     let fixed = fixed(scene, &layout.backdrop);
@@ -244,7 +243,8 @@ pub fn build(scene: &Scene, hits: &Hits, settings: &Settings, progress: &(dyn Fn
     };
     let labels = outline(&charting, &layout, &label_of, labels, fixed, &filled.covered);
     let fill = filled.covered.iter().filter(|&&c| c).count() as f64 / filled.covered.len().max(1) as f64;
-    let figures = Figures { charts: charting.charts.len(), halved, labels: labels.len(), fill, scale: layout.scale, gutter: layout.gutter };
+    let figures =
+        Figures { charts: charting.charts.len(), halved, labels: labels.len(), crowded, fill, scale: layout.scale, gutter: layout.gutter };
     progress(4, 4);
     let image = SourceImage { width: layout.width, height: layout.height, kind, texels, palette, covered: filled.covered, labels };
     Ok(Atlas { image, gbuffer, figures })

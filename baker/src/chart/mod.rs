@@ -26,7 +26,7 @@ use std::mem;
 use view::View;
 
 pub use family::{Choice, Family, Trial, reason};
-pub use labels::assign;
+pub use labels::{Labels, assign};
 pub(crate) use observe::Faces;
 pub(crate) use price::price;
 pub(crate) use unwrapped::Islands;
