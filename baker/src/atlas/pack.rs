@@ -239,7 +239,7 @@ impl Packing<'_> {
         let taller = height + RIM_ROWS;
         let heights = [Some(height), Some(taller).filter(|_| height >= SMALL && taller <= self.room()[1])];
         let mut sizes = heights.into_iter().flatten().filter(|_| gutter > 0).map(|height| [width, height]);
-        let rimmed = sizes.find_map(|size| Some((size, items.in_any_order(usize::MAX, size, [gutter, 1])?)));
+        let rimmed = sizes.find_map(|size| Some((size, items.in_any_order(QUICK, size, [gutter, 1])?)));
         let (rim, (size, spots)) = rimmed.map_or((0, (size, spots)), |found| (1, found));
         let mut wider = WIDE.into_iter().filter(|&wide| wide > gutter);
         let found = wider.find_map(|wide| Some((wide, items.in_any_order(usize::MAX, size, [wide, rim])?)));
