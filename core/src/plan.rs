@@ -60,6 +60,8 @@ impl Plan<'_> {
         self.backdrop = site.backdrop();
         let (texture, log2) = (site.bundle.texture(), site.block_log2());
         let room = Room::new(texture.width_log2, texture.height, log2, reach);
+        // The last strip may have been planned for pixels that are told from fewer texels.
+        self.near = room.map_or(0, |room| room.known(self.near));
         let blocks = 1u32.wrapping_shl(site.log2().wrapping_sub(log2));
         let mut across = Across { site, room, strip, log2, blocks, width: site.bundle.size().0, left: 0, block: 0 };
         for &stretch in site.sheets.stretches() {

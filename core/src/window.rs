@@ -310,6 +310,12 @@ impl Room {
         low.wrapping_sub(first) >= margin && high.wrapping_sub(first) < rows.wrapping_sub(margin)
     }
 
+    /// `row`, or the last window's first row if that is further up.
+    #[must_use]
+    pub fn known(&self, row: u16) -> u16 {
+        i32::from(row).min(self.last) as u16
+    }
+
     /// The first row of a window that begins `margin` above `low`, as far as the picture goes.
     #[inline(always)]
     pub fn first(&self, low: i32, margin: i32) -> i32 {

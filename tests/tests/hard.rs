@@ -146,7 +146,7 @@ cases! {
     a_ball_from_all_to_nothing: 26.0, 0.6, 112.0;
     a_needle: 32.0, 0.3, 1.0;
     a_fence_at_the_cells_frequency: 55.5, 0.1, 0.5;
-    t_junctions: 31.5, 0.3, 1.0;
+    t_junctions: 31.0, 0.3, 1.0;
     four_sheets_in_a_cell: 37.5, 0.2, 0.5;
     a_sheet_between_two_keys: 54.0, 0.1, 0.5, it_is_seen_between_keys_only;
     a_moebius_strip: 25.0, 1.9, 5.0;

@@ -166,6 +166,6 @@ fn more_colours_are_no_worse() {
         println!("{name}: {psnr:.3?} dB with 16 colours, 256, all");
         // Texels looked up nearest are farther from their mean than an antialiased picture is, and so are their exact colours: of 256 colours those
         // that few pixels see are nearer to it by a hair.
-        assert!(psnr[1] > psnr[0] && psnr[2] >= psnr[1] - 0.03, "{name}: {psnr:?}");
+        assert!(psnr[1] > psnr[0] && psnr[2] >= psnr[1] - 0.05, "{name}: {psnr:?}");
     }
 }
