@@ -106,3 +106,36 @@ impl Meetings {
         (0..self.words * 64).filter(|other| words[other / 64] >> (other % 64) & 1 == 1)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chart::{Density, Family, build};
+    use crate::scene::builtin;
+    use crate::trace::Tracer;
+
+    #[test]
+    fn charts_share_labels_and_meet_only_for_want_of_others() {
+        let mut scene = builtin::build("street").unwrap();
+        (scene.playback.width, scene.playback.height, scene.playback.frames) = (96, 72, 17);
+        let hits = Hits::cast(&scene, &Tracer::new(&scene), &|_, _| {});
+        let density = Density { most: 1.0, detail: f64::INFINITY, texel: 1.0 };
+        let charting = build(&scene, &hits, Family::Planes, &density, 512);
+        let charts = charting.charts.len();
+        assert!(charts > 20, "{charts} charts belong to the test");
+        let crowded: Vec<usize> = [2, 8, charts - 1, charts]
+            .into_iter()
+            .map(|limit| {
+                let Labels { of, count, crowded } = assign(&hits, &charting, limit);
+                assert!(count <= limit && of.len() == charts && of.iter().all(|&label| (1..=count as u16).contains(&label)));
+                // Those seen most have theirs alone.
+                let mut order: Vec<usize> = (0..charts).collect();
+                order.sort_by_key(|&c| (std::cmp::Reverse(charting.charts[c].hits), c));
+                let alone = order[..ALONE.min(limit / 2)].iter().all(|&c| of.iter().filter(|&&label| label == of[c]).count() == 1);
+                assert!(alone, "{limit}: {of:?}");
+                crowded
+            })
+            .collect();
+        assert!(crowded[0] > crowded[1] && crowded[1] > 0 && crowded[3] == 0, "{crowded:?}");
+    }
+}
