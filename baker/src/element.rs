@@ -30,13 +30,12 @@ pub struct Element {
     stencil: Stencil,
     /// Pixels of the cell and interval.
     volume: f32,
-    pixels: Pixels,
+    /// None: outlines are asked for by torn cells alone.
+    pixels: Option<Pixels>,
 }
 
 /// The pixels that an element is fitted to.
 enum Pixels {
-    /// None: outlines are asked for by torn cells alone.
-    None,
     /// The same ones in every frame, and all nodes' keys weigh the same: the products of the keys' weights, summed over the frames.
     Same(Sums, [[f32; 4]; 4]),
     /// Those of each frame.
@@ -98,7 +97,7 @@ impl Element {
         let ways = (0..4).filter_map(|set| Some((set, carried(set)?.layer)));
         let ways = ways.flat_map(|(set, layer)| (0..4).filter(move |&key| layer[key].is_some()).map(move |key| [set as u8, key as u8]));
         let (ways, stencil) = (ways.collect(), patch.stencil);
-        Self { layer, interval: interval as u32, set, ways, stencil, volume, pixels: Pixels::Each(Vec::new()) }
+        Self { layer, interval: interval as u32, set, ways, stencil, volume, pixels: None }
     }
 
     /// What a weight of one at every node alone gives to the patch's values.
@@ -128,7 +127,7 @@ impl Element {
         let first = self.ways.first().map_or(0, |way| way[0]);
         let alike = self.ways.iter().all(|way| way[0] == first) && sums.windows(2).all(|pair| pair[0] == pair[1]);
         self.pixels = match sums.first() {
-            _ if sums.iter().all(|&sums| sums == Sums::default()) => Pixels::None,
+            _ if sums.iter().all(|&sums| sums == Sums::default()) => None,
             Some(&same) if alike => {
                 let mut products = [[0.0; 4]; 4];
                 for weights in frames.iter().map(|weights| weights[usize::from(first)]) {
@@ -138,16 +137,16 @@ impl Element {
                         }
                     }
                 }
-                Pixels::Same(same, products)
+                Some(Pixels::Same(same, products))
             }
-            _ => Pixels::Each(sums),
+            _ => Some(Pixels::Each(sums)),
         };
     }
 
     /// Adds the element's share of the product A x to `y`, given the keys' weights in every frame of its interval.
     pub fn multiply(&self, weights: &[Weights], x: &[[f64; 2]], y: &mut [[f64; 2]]) {
-        if !matches!(self.pixels, Pixels::None) {
-            self.multiply_pixels(weights, x, y);
+        if let Some(pixels) = &self.pixels {
+            self.multiply_pixels(pixels, weights, x, y);
         }
         let corner = |bits: usize| self.layer[CORNERS[bits & 3]][1 + (bits >> 2)];
         let held = regularised(self.volume, &std::array::from_fn(|bits| value(x, corner(bits))));
@@ -155,13 +154,12 @@ impl Element {
     }
 
     /// Adds the share of its pixels.
-    fn multiply_pixels(&self, weights: &[Weights], x: &[[f64; 2]], y: &mut [[f64; 2]]) {
+    fn multiply_pixels(&self, pixels: &Pixels, weights: &[Weights], x: &[[f64; 2]], y: &mut [[f64; 2]]) {
         let (mut values, mut back) = ([[[0.0; 2]; VALUES]; 16], [[[0.0; 2]; VALUES]; 16]);
         for (values, way) in values.iter_mut().zip(&self.ways) {
             *values = self.stencil.values(&std::array::from_fn(|node| value(x, self.of(*way, node))));
         }
-        match &self.pixels {
-            Pixels::None => {}
+        match pixels {
             Pixels::Same(sums, products) => {
                 for (back, to) in back.iter_mut().zip(&self.ways) {
                     let mut mixed = Values::default();
@@ -304,7 +302,7 @@ mod tests {
                         let found: f64 = product.iter().zip(&y).map(|(a, b)| a[axis] * f64::from(b[axis])).sum();
                         assert!((found - exact[axis]).abs() < 1e-4, "{place:?}, {label}: {found}, exactly {}", exact[axis]);
                     }
-                    let kind = if matches!(element.pixels, Pixels::Same(..)) { &mut same } else { &mut each };
+                    let kind = if matches!(element.pixels, Some(Pixels::Same(..))) { &mut same } else { &mut each };
                     *kind += 1;
                     mixed += u32::from(element.ways.iter().any(|way| way[0] != element.ways[0][0]));
                 }

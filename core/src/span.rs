@@ -97,7 +97,7 @@ pub fn along<T, const WIDTH: u32, const ROWS: u32>(
     }
 }
 
-/// Likewise, positions moved by one of the offsets in turn.
+/// Likewise, an even number of them, positions moved by one of the offsets in turn.
 #[inline(always)]
 pub fn by_turns<T, const WIDTH: u32, const ROWS: u32>(
     pixels: &mut [T],

@@ -33,13 +33,12 @@ pub struct Baked {
 /// Bakes `scene`; `progress` hears the stage by name and how much of it is done, 0 to 1.
 pub fn bake(scene: Scene<'_>, progress: &(dyn Fn(&str, f32) + Sync)) -> Result<Baked> {
     progress("reading the scene", 0.0);
-    let demo = matches!(scene, Scene::Demo);
-    let (scene, name) = match scene {
-        Scene::Demo => (scene::load_builtin(DEMO, &Overrides::default())?, DEMO.to_owned()),
-        Scene::File(path) => (scene::load(path, &Overrides::default())?, path.display().to_string()),
+    let (scene, name, options) = match scene {
+        Scene::Demo => (scene::load_builtin(DEMO, &Overrides::default())?, DEMO.to_owned(), settled()),
+        Scene::File(path) => (scene::load(path, &Overrides::default())?, path.display().to_string(), Options::default()),
     };
     // Someone waits for the picture: the antialiased truth is for `cubist-bake --report`.
-    let options = Options { truth: TruthFrames::None, ..if demo { settled() } else { Options::default() } };
+    let options = Options { truth: TruthFrames::None, ..options };
     let hear = |stage: &str, part: f64| progress(stage, part as f32);
     let (bytes, report) = job::bake_scene(&scene, &options, &hear).with_context(|| name.clone())?;
     let warnings = report.warnings.iter().map(|warning| format!("{name}: {warning}")).collect();

@@ -94,7 +94,7 @@ impl Items {
         Self { shapes, sizes: masks.iter().map(|m| [m.width, m.height]).collect(), area, orders }
     }
 
-    /// Lays everything down in order `order`; the height, and the spots.
+    /// Lays everything down in order `order`, so many texels between charts and around them all; the height, and the spots.
     fn lay(&self, order: usize, [width, height]: [u32; 2], [gutter, rim]: [u32; 2]) -> Option<(u32, Vec<Spot>)> {
         if self.area > u64::from(width) * u64::from(height) {
             return None;
