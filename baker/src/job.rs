@@ -9,6 +9,7 @@ use crate::fewer;
 use crate::finer;
 use crate::inspect::Inspection;
 use crate::made::Made;
+use crate::repaint;
 use crate::report::{Origin, Report, Seconds};
 use crate::scene::Scene;
 use crate::straight;
@@ -73,6 +74,8 @@ pub struct Options {
     pub independent_every: usize,
     /// Keeps sheets that take more than what they show is worth.
     pub all_sheets: bool,
+    /// Texels keep the colours of what lies there, whatever playback makes of them.
+    pub plain: bool,
     /// What to reach.
     pub goal: Goal,
     /// How much is compared with the truth.
@@ -97,6 +100,7 @@ impl Default for Options {
             lambda: None,
             independent_every: Settings::default().coding.independent_every,
             all_sheets: false,
+            plain: false,
             goal: Goal::AsSet,
             truth: TruthFrames::Most(16),
             load_seconds: 0.0,
@@ -210,7 +214,7 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
     }
     let choice_seconds = start.elapsed().as_secs_f64();
     let settings = options.settings(scene.playback.width);
-    let Chosen { flat, encoded, settings, search_seconds, warnings } = match options.goal {
+    let Chosen { mut flat, encoded, settings, search_seconds, warnings } = match options.goal {
         Goal::AsSet => {
             let flat = bake::flatten(scene, &settings.atlas, progress)?;
             something_seen(&flat)?;
@@ -232,10 +236,13 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
     let made = if prunes { fewer::choose(scene, &flat, made, progress)? } else { made };
     let (made, other) = if free { finer::choose(scene, &flat, made, &all, progress)? } else { (made, None) };
     let bends = options.goal == Goal::AsSet && options.space.is_none();
-    let (made, spaces) = if bends { straight::choose(scene, &flat, made, progress)? } else { (made, Vec::new()) };
+    let (mut made, spaces) = if bends { straight::choose(scene, &flat, made, progress)? } else { (made, Vec::new()) };
     let finer = other.map(|other| other.said(&made));
+    let (search_seconds, paint_start) = (search_seconds + finer_start.elapsed().as_secs_f64(), Instant::now());
+    let truth = Truth::new(scene);
+    let repainted = !options.plain && repaint::repaint(&mut made, &mut flat.atlas, options.goal, &truth, progress)?;
+    let (paint_seconds, verify_start) = (paint_start.elapsed().as_secs_f64(), Instant::now());
     let Made { settings, encoded, quality } = made;
-    let (search_seconds, verify_start) = (search_seconds + finer_start.elapsed().as_secs_f64(), Instant::now());
     let inspection = Inspection::of(&encoded.bundle).map_err(verify::VerifyError::from)?;
     let work = verify::work(&encoded.bundle)?;
     let frames = match options.truth {
@@ -247,7 +254,6 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
         None
     } else {
         progress("comparing with the truth", 0.0);
-        let truth = Truth::new(scene);
         let bar = |d, n| progress("comparing with the truth", part(d, n));
         Some(verify::against_truth(&encoded.bundle, &truth, &frames, &bar)?)
     };
@@ -257,10 +263,11 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
         atlas: flat.atlas_seconds,
         rays: flat.ray_seconds,
         encode: encoded.seconds,
+        paint: paint_seconds,
         verify: exact_seconds + verify_start.elapsed().as_secs_f64(),
         search: choice_seconds + search_seconds,
     };
-    let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings, spaces };
+    let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings, spaces, repainted };
     let mut report = Report::new(&origin, &inspection, quality, truth, work, seconds);
     report.warnings.extend(warnings.into_iter().chain(finer));
     Ok(Baked { bundle: encoded.bundle, report, flat, settings })

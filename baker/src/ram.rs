@@ -6,15 +6,15 @@
 
 use crate::bake::{BakeError, Encoded, Flat, Settings};
 use crate::climb::{Free, Step, climb};
-use crate::encode::image_bytes;
+use crate::encode::{image_bytes, with_section};
 use crate::inspect::{space_name, time_name};
 use crate::job::{Chosen, Whole};
 use crate::metrics;
 use crate::report::grouped;
 use crate::tune::{Search, possible};
 use crate::verify;
-use cubist_core::format::{Envelope, PATH, Path, SPACE_LINEAR, TIME_LINEAR};
-use cubist_core::{Bundle, checksum};
+use cubist_core::Bundle;
+use cubist_core::format::{PATH, Path, SPACE_LINEAR, TIME_LINEAR};
 
 /// Cells tried, pixels, from the one asked for on.
 const CELLS: [u32; 4] = [4, 8, 16, 32];
@@ -180,11 +180,7 @@ fn value(flat: &Flat, tried: &Tried) -> Result<Value, BakeError> {
 /// The memory that a player of `bundle` would need if its time and its space were others, with the same layers; `None` if that is no bundle.
 fn memory_as(bundle: &[u8], time: u8, space: u8) -> Option<usize> {
     let path = postcard::to_stdvec(&Path { time, space, ..*Bundle::parse(bundle).ok()?.path() }).ok()?;
-    let (mut envelope, _) = postcard::take_from_bytes::<Envelope<'_>>(bundle).ok()?;
-    envelope.sections.iter_mut().find(|section| section.tag == PATH)?.bytes = &path;
-    let mut bytes = postcard::to_stdvec(&envelope).ok()?;
-    bytes.extend(checksum(&bytes).to_le_bytes());
-    Some(Bundle::parse(&bytes).ok()?.memory_needed())
+    Some(Bundle::parse(&with_section(bundle, PATH, &path)?).ok()?.memory_needed())
 }
 
 /// What the user should know: how `tried` differs from what was `asked` for, and what that costs. `whole`: the bundle that is too large.

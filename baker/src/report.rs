@@ -30,6 +30,9 @@ pub struct Seconds {
     pub rays: f64,
     /// Sheets, fit, order, coding.
     pub encode: f64,
+    /// Colouring texels by the pixels that show them.
+    #[serde(default)]
+    pub paint: f64,
     /// Playing and comparing.
     pub verify: f64,
     /// Bakes that a search tried and did not keep.
@@ -110,6 +113,9 @@ pub struct Source {
     /// Whether texels were moved inside charts to where their detail is seen.
     #[serde(default)]
     pub rewarped: bool,
+    /// Whether texels have the colours of the pixels that show them rather than of what lies there.
+    #[serde(default)]
+    pub repainted: bool,
     /// What was tried before, and what came of it; empty where nothing was.
     pub trials: Vec<Trial>,
     /// Connected regions.
@@ -181,6 +187,8 @@ pub(crate) struct Origin<'a> {
     pub settings: &'a Settings,
     /// Kinds of space that were tried.
     pub spaces: Vec<straight::Trial>,
+    /// Texels were coloured by the pixels that show them.
+    pub repainted: bool,
 }
 
 impl Report {
@@ -226,6 +234,7 @@ impl Report {
                 raw_bytes: inspection.image.raw_bytes,
                 candidate: settings.atlas.charts.family,
                 rewarped: settings.atlas.charts.rewarped,
+                repainted: origin.repainted,
                 trials: settings.atlas.charts.tried().copied().collect(),
                 charts: figures.charts,
                 halved: figures.halved,
@@ -360,7 +369,7 @@ pub fn table(report: &Report) -> Vec<(String, String)> {
     row(
         "source image",
         format!(
-            "{} bytes: {} x {} texels of {}, {} colours, {:.0} % covered; {}",
+            "{} bytes: {} x {} texels of {}, {} colours{}, {:.0} % covered; {}",
             grouped(bytes.atlas),
             image.width,
             image.height,
@@ -370,6 +379,7 @@ pub fn table(report: &Report) -> Vec<(String, String)> {
                 TexelKind::Direct565 => "RGB565",
             },
             image.colours,
+            if image.repainted { " by what is played" } else { "" },
             100.0 * image.fill,
             match image.storage {
                 Storage::Raw => "raw".to_owned(),
@@ -419,8 +429,8 @@ pub fn table(report: &Report) -> Vec<(String, String)> {
     row(
         "seconds",
         format!(
-            "{:.1}: load {:.1}, rays {:.1}, atlas {:.1}, encode {:.1}, verify {:.1}{search}",
-            seconds.total, seconds.load, seconds.rays, seconds.atlas, seconds.encode, seconds.verify
+            "{:.1}: load {:.1}, rays {:.1}, atlas {:.1}, encode {:.1}, paint {:.1}, verify {:.1}{search}",
+            seconds.total, seconds.load, seconds.rays, seconds.atlas, seconds.encode, seconds.paint, seconds.verify
         ),
     );
     rows

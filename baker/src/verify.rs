@@ -188,6 +188,27 @@ pub fn play(bytes: &[u8], frames: &[u32], mut show: impl FnMut(u32, &[u8])) -> R
     })
 }
 
+/// Where the pixels of the frames `frames` of a finished bundle come from; `show` gets each one's number and positions, texels, row by row.
+///
+/// # Errors
+/// [`VerifyError`] where the player refuses the bytes.
+pub(crate) fn probe(bytes: &[u8], frames: &[u32], mut show: impl FnMut(u32, &[[f32; 2]])) -> Result<(), VerifyError> {
+    let bundle = Bundle::parse(bytes)?;
+    with_screen(&bundle, |mut screen| {
+        let mut probes = vec![Probe::default(); screen.row.len()];
+        let mut positions = Vec::new();
+        for &frame in frames {
+            screen.player.seek(Frame(frame));
+            positions.clear();
+            for y in 0..screen.height {
+                screen.probe(y, &mut probes);
+                positions.extend(probes.iter().map(|probe| texels(probe.at)));
+            }
+            show(frame, &positions);
+        }
+    })
+}
+
 /// Frame `frame` as exact rays see it through the source image, nearest texel: R, G, B, row by row.
 #[must_use]
 pub fn exact_frame(atlas: &Atlas, frame: u32) -> Vec<u8> {

@@ -168,7 +168,7 @@ impl SourceImage {
 
     /// The index of the texel at a position, texels; outside the image that of the nearest texel.
     #[inline]
-    fn place(&self, [u, v]: [f32; 2]) -> usize {
+    pub(crate) fn place(&self, [u, v]: [f32; 2]) -> usize {
         // What is below zero comes to zero.
         let (x, y) = ((u as u32).min(self.width - 1), (v as u32).min(self.height - 1));
         (y * self.width + x) as usize
@@ -237,10 +237,7 @@ pub fn build(scene: &Scene, hits: &Hits, settings: &Settings, progress: &(dyn Fn
     let filled = fill::fill(scene, &Shader::new(scene), hits, &charting, &layout, &seen);
     progress(3, 4);
     let kind = settings.texels;
-    let (texels, palette) = match kind.colours() {
-        0 => palette::direct(&filled.colours),
-        most => palette::reduce(&filled.colours, &seen.count, settings.colours.clamp(2, most)),
-    };
+    let (texels, palette) = reduced(&filled.colours, &seen.count, settings);
     let labels = outline(&charting, &layout, &label_of, labels, fixed, &filled.covered);
     let fill = filled.covered.iter().filter(|&&c| c).count() as f64 / filled.covered.len().max(1) as f64;
     let figures =
@@ -248,6 +245,14 @@ pub fn build(scene: &Scene, hits: &Hits, settings: &Settings, progress: &(dyn Fn
     progress(4, 4);
     let image = SourceImage { width: layout.width, height: layout.height, kind, texels, palette, covered: filled.covered, labels };
     Ok(Atlas { image, gbuffer, figures })
+}
+
+/// Indices and palette of `colours`; a texel weighs as much as the pixels that see it.
+pub(crate) fn reduced(colours: &[[u8; 3]], seen: &[u32], settings: &Settings) -> (Vec<u16>, Vec<[u8; 3]>) {
+    match settings.texels.colours() {
+        0 => palette::direct(colours),
+        most => palette::reduce(colours, seen, settings.colours.clamp(2, most)),
+    }
 }
 
 /// Bytes of a raw texel, its bit of the mask counted in.

@@ -100,20 +100,10 @@ pub fn bundle(content: &Content<'_>, settings: CodingSettings, header: Header<'_
         cameras: cameras.as_flattened(),
         records: &records,
     };
-    let palette: Vec<u8> = match image.kind {
-        TexelKind::Direct565 => Vec::new(),
-        _ => image.palette.iter().flat_map(|&colour| rgb565(colour).to_le_bytes()).collect(),
-    };
-    let (packing, texels) = match header.storage {
-        Storage::Raw => (RAW, picture::texels(image)),
-        Storage::Packed => (PACKED, packed(image)),
-    };
-    let encoding = image.kind.encoding() | packing;
-    let atlas =
-        Atlas { width_log2: image.width.trailing_zeros() as u8, height: image.height as u16, encoding, palette: &palette, texels: &texels };
+    let atlas = atlas_bytes(image, header.storage);
     let mask = picture::mask(image);
     let label_bytes: Vec<u8> = labels.iter().flat_map(|label| label.to_bytes()).collect();
-    let (path, atlas) = (postcard_bytes(&path), postcard_bytes(&atlas));
+    let path = postcard_bytes(&path);
     let section = |tag, required, bytes| Section { tag, required, bytes };
     let mut sections = vec![section(PATH, true, &path[..]), section(ATLAS, true, &atlas), section(LABELS, true, &label_bytes)];
     // A packed picture brings its mask along.
@@ -125,9 +115,46 @@ pub fn bundle(content: &Content<'_>, settings: CodingSettings, header: Header<'_
     }
     let mut envelope = Envelope { magic: MAGIC, version: VERSION, sections: Default::default() };
     envelope.sections.extend(sections);
-    let mut bytes = postcard_bytes(&envelope);
+    Ok(sealed(&envelope))
+}
+
+/// The section of the source image.
+fn atlas_bytes(image: &SourceImage, storage: Storage) -> Vec<u8> {
+    let palette: Vec<u8> = match image.kind {
+        TexelKind::Direct565 => Vec::new(),
+        _ => image.palette.iter().flat_map(|&colour| rgb565(colour).to_le_bytes()).collect(),
+    };
+    let (packing, texels) = match storage {
+        Storage::Raw => (RAW, picture::texels(image)),
+        Storage::Packed => (PACKED, packed(image)),
+    };
+    let encoding = image.kind.encoding() | packing;
+    postcard_bytes(&Atlas {
+        width_log2: image.width.trailing_zeros() as u8,
+        height: image.height as u16,
+        encoding,
+        palette: &palette,
+        texels: &texels,
+    })
+}
+
+/// `bundle` with the texels and the palette of `image`, which is of the size and the labels of its own; `None` if that is no bundle.
+pub(crate) fn with_image(bundle: &[u8], image: &SourceImage, storage: Storage) -> Option<Vec<u8>> {
+    with_section(bundle, ATLAS, &atlas_bytes(image, storage))
+}
+
+/// `bundle` with `bytes` for its section `tag`; `None` if it has none, or is no bundle.
+pub(crate) fn with_section(bundle: &[u8], tag: [u8; 4], bytes: &[u8]) -> Option<Vec<u8>> {
+    let (mut envelope, _) = postcard::take_from_bytes::<Envelope<'_>>(bundle).ok()?;
+    envelope.sections.iter_mut().find(|section| section.tag == tag)?.bytes = bytes;
+    Some(sealed(&envelope))
+}
+
+/// The bytes of a bundle, checksum and all.
+fn sealed(envelope: &Envelope<'_>) -> Vec<u8> {
+    let mut bytes = postcard_bytes(envelope);
     bytes.extend(cubist_core::checksum(&bytes).to_le_bytes());
-    Ok(bytes)
+    bytes
 }
 
 fn postcard_bytes<T: serde::Serialize>(value: &T) -> Vec<u8> {
