@@ -9,7 +9,7 @@ use crate::fewer;
 use crate::finer;
 use crate::inspect::Inspection;
 use crate::made::Made;
-use crate::repaint;
+use crate::repaint::Painter;
 use crate::report::{Origin, Report, Seconds};
 use crate::scene::Scene;
 use crate::straight;
@@ -240,7 +240,7 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
     let finer = other.map(|other| other.said(&made));
     let (search_seconds, paint_start) = (search_seconds + finer_start.elapsed().as_secs_f64(), Instant::now());
     let truth = Truth::new(scene);
-    let repainted = !options.plain && repaint::repaint(&mut made, &mut flat.atlas, options.goal, &truth, progress)?;
+    let repainted = !options.plain && Painter::new(&truth, progress).repaint(&mut made, &mut flat.atlas, options.goal)?;
     let (paint_seconds, verify_start) = (paint_start.elapsed().as_secs_f64(), Instant::now());
     let Made { settings, encoded, quality } = made;
     let inspection = Inspection::of(&encoded.bundle).map_err(verify::VerifyError::from)?;

@@ -31,7 +31,7 @@ pub mod planes;
 pub mod polish;
 mod prune;
 pub mod ram;
-mod repaint;
+pub mod repaint;
 pub mod report;
 mod samples;
 pub mod scene;

@@ -1,5 +1,6 @@
 //! Repainting: every texel in the colour that suits the pixels that show it.
-//! A finished bundle and its source image come from `job`; both go back with other colours, everything else as it was.
+//! A finished bundle and its source image come from `job`, those that a search tries from `tune`; both go back with other colours, everything else as
+//! it was.
 //!
 //! A texel is coloured by what lies there, but a played pixel sees more than that: as much of the scene as the pixel covers, by a position that is
 //! interpolated. Where pixels show their nearest texel, the squared error of all of them is a sum over texels, and each one's part is least at the
@@ -7,21 +8,24 @@
 //! cover of a pixel.
 
 use crate::atlas::{self, Atlas, SourceImage};
-use crate::bake::{Encoded, Progress, Settings};
+use crate::bake::Progress;
 use crate::encode;
 use crate::job::Goal;
 use crate::made::Made;
 use crate::truth::{Truth, spread};
 use crate::verify::{self, VerifyError};
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Frames looked at, evenly spread: twice as many gained real scenes .04 dB.
 const FRAMES: u32 = 64;
 /// Samples of the scene along each side of a pixel: as good as four, for a texel is shown by many pixels.
 const SIDE: u32 = 2;
+/// Bytes that the frames looked at may take: of large ones there are fewer.
+const MOST_BYTES: usize = 256 << 20;
 /// Frames that one thread looks at in a row.
 const RUN: usize = 4;
+/// Colours that a picture keeps at least where more do not fit a budget.
+const FEW: usize = 8;
 /// Pixels that the colour a texel had counts as.
 const BEFORE: f64 = 1.0;
 
@@ -46,75 +50,179 @@ impl Shown {
     }
 }
 
-/// Gives `made`, and the source image that it came from, colours that suit what it shows, where there are better ones and it reaches `goal` with them:
-/// whether it has them now.
-///
-/// # Errors
-/// [`VerifyError`] where the player refuses the bytes.
-pub(crate) fn repaint(made: &mut Made, atlas: &mut Atlas, goal: Goal, truth: &Truth<'_>, progress: Progress<'_>) -> Result<bool, VerifyError> {
-    let (Made { settings: Settings { atlas: settings, .. }, encoded: Encoded { bundle, .. }, quality }, image) = (made, &atlas.image);
-    let Some(painted) = painted(bundle, image, settings, truth, progress)? else { return Ok(false) };
-    let Some(with_it) = encode::with_image(bundle, &painted, settings.storage) else { return Ok(false) };
-    let before = std::mem::replace(&mut atlas.image, painted);
-    let after = verify::against_exact(&with_it, atlas, &|_, _| {})?;
-    let reached = match goal {
-        Goal::Budget(most) => with_it.len() as u64 <= most,
-        Goal::Psnr(least) => after.psnr_mean >= least,
-        Goal::AsSet | Goal::Ram(_) => true,
-    };
-    if reached {
-        (*bundle, *quality) = (with_it, after);
-    } else {
-        atlas.image = before;
+/// What the scene has in the pixels of some frames.
+pub struct Painter {
+    frames: Vec<u32>,
+    /// R, G, B, row by row.
+    pictures: Vec<Vec<u8>>,
+}
+
+impl Painter {
+    /// Renders them; `progress` hears how many of them are done.
+    #[must_use]
+    pub fn new(truth: &Truth<'_>, progress: Progress<'_>) -> Self {
+        let [width, height, frames] = truth.shape();
+        let most = MOST_BYTES / (3 * width as usize * height as usize).max(1);
+        let frames = spread(frames, FRAMES.min(most.max(1) as u32));
+        let total = frames.len().max(1) as f64;
+        let render = |(done, &frame): (usize, &u32)| {
+            progress("painting", done as f64 / total);
+            truth.sampled(frame, SIDE)
+        };
+        let pictures = frames.iter().enumerate().map(render).collect();
+        Self { frames, pictures }
     }
-    Ok(reached)
-}
 
-/// `image` in colours that suit what `bundle` shows of it, if there are any that suit better. The background keeps its own.
-fn painted(
-    bundle: &[u8],
-    image: &SourceImage,
-    settings: &atlas::Settings,
-    truth: &Truth<'_>,
-    progress: Progress<'_>,
-) -> Result<Option<SourceImage>, VerifyError> {
-    let shown = shown(bundle, image, truth, progress)?;
-    let [left, top, right, bottom] = image.labels.first().map_or([0; 4], |background| background.rect.map(u32::from));
-    let fixed = |texel: u32| (left..right).contains(&(texel % image.width)) && (top..bottom).contains(&(texel / image.width));
-    let before: Vec<[u8; 3]> = image.texels.iter().map(|&texel| image.colour(texel)).collect();
-    let wanted = (0..).zip(&before).zip(&shown).map(|((texel, &colour), shown)| if fixed(texel) { colour } else { shown.best(colour) });
-    let seen: Vec<u32> = shown.iter().map(|shown| shown.pixels as u32).collect();
-    let (texels, palette) = atlas::reduced(&wanted.collect::<Vec<_>>(), &seen, settings);
-    let painted = SourceImage { texels, palette, ..image.clone() };
-    let after = painted.texels.iter().map(|&texel| painted.colour(texel));
-    let gained: f64 = shown.iter().zip(before.iter().zip(after)).map(|(shown, (&before, after))| shown.error(before) - shown.error(after)).sum();
-    Ok((gained > 0.0).then_some(painted))
-}
-
-/// What the scene has in the pixels that show each texel of `image`, by some frames of `bundle`. Sums of whole numbers: the same on any number of threads.
-fn shown(bundle: &[u8], image: &SourceImage, truth: &Truth<'_>, progress: Progress<'_>) -> Result<Vec<Shown>, VerifyError> {
-    let frames = spread(truth.frames(), FRAMES);
-    let (done, total) = (AtomicU32::new(0), frames.len().max(1) as f64);
-    let none = || vec![Shown::default(); image.texels.len()];
-    let of = |frames: &[u32]| {
-        let mut sums = none();
-        verify::probe(bundle, frames, |frame, positions| {
-            let scene = truth.sampled(frame, SIDE);
-            for (&position, rgb) in positions.iter().zip(scene.as_chunks::<3>().0) {
-                let sum = &mut sums[image.place(position)];
-                sum.rgb.iter_mut().zip(rgb).for_each(|(sum, &v)| *sum += u64::from(v));
-                sum.pixels += 1;
+    /// Gives `made`, and the source image that it came from, colours that suit what it shows, where there are better ones and it reaches `goal` with
+    /// them: whether it has them now.
+    ///
+    /// # Errors
+    /// [`VerifyError`] where the player refuses the bytes.
+    pub(crate) fn repaint(&self, made: &mut Made, atlas: &mut Atlas, goal: Goal) -> Result<bool, VerifyError> {
+        // Fewer colours take fewer bytes, which a budget may ask for.
+        let (all, before) = (made.settings.atlas.colours, atlas.image.palette.len());
+        let fewer = (0..).map(|halvings| before >> halvings).take_while(|&colours| colours >= FEW);
+        for colours in std::iter::once(all).chain(fewer.filter(|_| matches!(goal, Goal::Budget(_)))) {
+            let settings = atlas::Settings { colours, ..made.settings.atlas };
+            let Some((bundle, image)) = self.painted(&made.encoded.bundle, &atlas.image, &settings)? else { break };
+            if matches!(goal, Goal::Budget(most) if bundle.len() as u64 > most) {
+                continue;
             }
-            progress("repainting", f64::from(done.fetch_add(1, Ordering::Relaxed) + 1) / total);
-        })?;
-        Ok(sums)
-    };
-    let add = |mut all: Vec<Shown>, some: Vec<Shown>| {
-        for (all, some) in all.iter_mut().zip(some) {
-            all.rgb.iter_mut().zip(some.rgb).for_each(|(all, some)| *all += some);
-            all.pixels += some.pixels;
+            let quality = verify::through(&bundle, &image, &atlas.gbuffer, &|_, _| {})?;
+            if matches!(goal, Goal::Psnr(least) if quality.psnr_mean < least) {
+                break;
+            }
+            (made.encoded.bundle, made.quality, atlas.image) = (bundle, quality, image);
+            return Ok(true);
         }
-        Ok(all)
-    };
-    frames.par_chunks(RUN).map(of).try_reduce(none, add)
+        Ok(false)
+    }
+
+    /// `bundle` and its source image in colours that suit what it shows, if there are any that suit better. The background keeps its own.
+    ///
+    /// # Errors
+    /// [`VerifyError`] where the player refuses the bytes.
+    pub fn painted(
+        &self,
+        bundle: &[u8],
+        image: &SourceImage,
+        settings: &atlas::Settings,
+    ) -> Result<Option<(Vec<u8>, SourceImage)>, VerifyError> {
+        let shown = self.shown(bundle, image)?;
+        let [left, top, right, bottom] = image.labels.first().map_or([0; 4], |background| background.rect.map(u32::from));
+        let fixed = |texel: u32| (left..right).contains(&(texel % image.width)) && (top..bottom).contains(&(texel / image.width));
+        let before: Vec<[u8; 3]> = image.texels.iter().map(|&texel| image.colour(texel)).collect();
+        let best = |((texel, &colour), shown): ((u32, &[u8; 3]), &Shown)| if fixed(texel) { colour } else { shown.best(colour) };
+        let wanted: Vec<[u8; 3]> = (0..).zip(&before).zip(&shown).map(best).collect();
+        let seen: Vec<u32> = shown.iter().map(|shown| shown.pixels as u32).collect();
+        let (texels, palette) = atlas::reduced(&wanted, &seen, settings);
+        let painted = SourceImage { texels, palette, ..image.clone() };
+        let error =
+            |colours: &mut dyn Iterator<Item = [u8; 3]>| shown.iter().zip(colours).map(|(shown, colour)| shown.error(colour)).sum::<f64>();
+        let after = error(&mut painted.texels.iter().map(|&texel| painted.colour(texel)));
+        if after >= error(&mut before.into_iter()) {
+            return Ok(None);
+        }
+        Ok(encode::with_image(bundle, &painted, settings.storage).map(|bundle| (bundle, painted)))
+    }
+
+    /// What the scene has in the pixels that show each texel of `image`. Sums of whole numbers: the same on any number of threads.
+    fn shown(&self, bundle: &[u8], image: &SourceImage) -> Result<Vec<Shown>, VerifyError> {
+        let none = || vec![Shown::default(); image.texels.len()];
+        let of = |(frames, pictures): (&[u32], &[Vec<u8>])| {
+            let (mut sums, mut pictures) = (none(), pictures.iter());
+            verify::probe(bundle, frames, |_, positions| {
+                let scene = pictures.next().map_or(&[][..], |picture| picture.as_chunks::<3>().0);
+                for (&position, rgb) in positions.iter().zip(scene) {
+                    let sum = &mut sums[image.place(position)];
+                    sum.rgb.iter_mut().zip(rgb).for_each(|(sum, &v)| *sum += u64::from(v));
+                    sum.pixels += 1;
+                }
+            })?;
+            Ok(sums)
+        };
+        let add = |mut all: Vec<Shown>, some: Vec<Shown>| {
+            for (all, some) in all.iter_mut().zip(some) {
+                all.rgb.iter_mut().zip(some.rgb).for_each(|(all, some)| *all += some);
+                all.pixels += some.pixels;
+            }
+            Ok(all)
+        };
+        self.frames.par_chunks(RUN).zip(self.pictures.par_chunks(RUN)).map(of).try_reduce(none, add)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bake::{self, Settings};
+    use crate::inspect::Inspection;
+    use crate::scene::{Scene, builtin};
+    use cubist_core::format::ATLAS;
+
+    fn small(name: &str) -> (Scene, Atlas, Made) {
+        let mut scene = builtin::build(name).unwrap();
+        (scene.playback.width, scene.playback.height, scene.playback.frames) = (96, 72, 17);
+        let settings = Settings::default();
+        let flat = bake::flatten(&scene, &settings.atlas, &|_, _| {}).unwrap();
+        let made = Made::new(&scene, &flat, settings).unwrap();
+        (scene, flat.atlas, made)
+    }
+
+    fn repainted(scene: &Scene, atlas: &mut Atlas, made: &mut Made, goal: Goal) -> bool {
+        Painter::new(&Truth::new(scene), &|_, _| {}).repaint(made, atlas, goal).unwrap()
+    }
+
+    /// The mean PSNR against the antialiased scene, all frames.
+    fn against_truth(scene: &Scene, made: &Made) -> f64 {
+        let frames = spread(scene.playback.frames, u32::MAX);
+        verify::against_truth(&made.encoded.bundle, &Truth::new(scene), &frames, &|_, _| {}).unwrap().psnr_mean
+    }
+
+    #[test]
+    fn the_best_colour_has_the_least_error() {
+        let shown = Shown { rgb: [0, 255 * 999, 100 * 999], pixels: 999 };
+        let best = shown.best([255, 0, 100]);
+        assert_eq!(best, [0, 255, 100]);
+        for other in [[1, 255, 100], [0, 254, 100], [0, 255, 99], [0, 255, 101]] {
+            assert!(shown.error(best) < shown.error(other), "{other:?}");
+        }
+        // What no pixel shows keeps its colour.
+        assert_eq!(Shown::default().best([7, 8, 9]), [7, 8, 9]);
+    }
+
+    #[test]
+    fn pictures_come_closer_to_the_scene_by_colours_alone() {
+        for (name, least) in [("round-columns", 1.0), ("terrain", 1.0), ("pivot", 0.2)] {
+            let (scene, mut atlas, mut made) = small(name);
+            let (before, bundle, image) = (against_truth(&scene, &made), made.encoded.bundle.clone(), atlas.image.clone());
+            assert!(repainted(&scene, &mut atlas, &mut made, Goal::AsSet), "{name}");
+            let after = against_truth(&scene, &made);
+            assert!(after > before + least, "{name}: {before} {after}");
+            let of = |bytes: &[u8]| {
+                let found = Inspection::of(bytes).unwrap();
+                (found.key_bytes(), found.workspace, found.bytes - found.section_bytes(ATLAS))
+            };
+            assert_eq!(of(&bundle), of(&made.encoded.bundle), "{name}");
+            // The report's figures are those of what plays.
+            assert_eq!(made.quality, verify::against_exact(&made.encoded.bundle, &atlas, &|_, _| {}).unwrap(), "{name}");
+            let [left, top, right, bottom] = image.labels[0].rect.map(u32::from);
+            for texel in (top..bottom).flat_map(|y| (left..right).map(move |x| (y * image.width + x) as usize)) {
+                let [before, after] = [&image, &atlas.image].map(|image| image.colour(image.texels[texel]));
+                let apart = before.iter().zip(after).map(|(a, b)| a.abs_diff(b)).max().unwrap();
+                assert!(apart <= 8, "{name}: the background was {before:?} and is {after:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn goals_that_are_reached_stay_reached() {
+        let (scene, mut atlas, mut made) = small("pyramid");
+        let (bundle, quality, texels) = (made.encoded.bundle.clone(), made.quality, atlas.image.texels.clone());
+        for goal in [Goal::Budget(10), Goal::Psnr(99.0)] {
+            assert!(!repainted(&scene, &mut atlas, &mut made, goal), "{goal:?}");
+            assert!(made.encoded.bundle == bundle && made.quality == quality && atlas.image.texels == texels, "{goal:?}");
+        }
+        assert!(repainted(&scene, &mut atlas, &mut made, Goal::Budget(1 << 20)) && made.encoded.bundle != bundle);
+    }
 }

@@ -25,10 +25,10 @@ impl<'a> Truth<'a> {
         Self { scene, tracer: Tracer::new(scene), shader: Shader::new(scene) }
     }
 
-    /// Frames of the scene.
-    #[must_use]
-    pub fn frames(&self) -> u32 {
-        self.scene.playback.frames
+    /// Width, height and number of the frames.
+    pub(crate) fn shape(&self) -> [u32; 3] {
+        let play = &self.scene.playback;
+        [play.width, play.height, play.frames]
     }
 
     /// Renders frame `frame`: R, G, B, row by row; the same bytes on any number of threads.

@@ -9,10 +9,12 @@ use crate::encode::{self, image_bytes};
 use crate::gbuffer::Hits;
 use crate::job::{self, Chosen, Goal, Options, Whole};
 use crate::metrics;
+use crate::repaint::Painter;
 use crate::report::grouped;
 use crate::samples::Samples;
 use crate::scene::Scene;
 use crate::trace::Tracer;
+use crate::truth::Truth;
 use crate::verify;
 use std::time::Instant;
 
@@ -187,7 +189,7 @@ impl Search<'_> {
             let flat = self.flat(source)?;
             if detail == asked.detail && ratio == 1.0 {
                 // Where the image is full, densities above what it holds change nothing.
-                scale = flat.atlas.figures.scale;
+                scale = flat.atlas.figures.scale.min(1.0);
             }
             let packed = self.options.storage.is_none().then(|| image_bytes(&flat.atlas.image, Storage::Packed));
             let bytes = image_bytes(&flat.atlas.image, source.storage);
@@ -315,6 +317,7 @@ impl Search<'_> {
     /// The smallest bundle whose mean PSNR against exact rays reaches `asked`.
     fn psnr(&self, asked: f64) -> Result<Chosen, BakeError> {
         let mut source = self.options.source();
+        let painter = (!self.options.plain).then(|| Painter::new(&Truth::new(self.scene), self.progress));
         let steps = CELLS.len() * INTERVALS.len() + STEPS;
         let (mut step, mut nearest, mut room, mut exceeded) = (0, 0.0f64, MOST_MEMORY, None);
         // Of bundles that reach it the smaller one counts, of those that do not the better one.
@@ -322,7 +325,10 @@ impl Search<'_> {
             self.say(step, steps);
             step += 1;
             let Some(Encoded { bundle, .. }) = possible(self.encode(flat, settings), &mut exceeded)? else { return Ok(None) };
-            let psnr = verify::against_exact(&bundle, &flat.atlas, &|_, _| {})?.psnr_mean;
+            let painted = painter.as_ref().map_or(Ok(None), |painter| painter.painted(&bundle, &flat.atlas.image, &settings.atlas))?;
+            let (bundle, image) = painted.map_or((bundle, None), |(bundle, image)| (bundle, Some(image)));
+            let quality = verify::through(&bundle, image.as_ref().unwrap_or(&flat.atlas.image), &flat.atlas.gbuffer, &|_, _| {})?;
+            let psnr = quality.psnr_mean;
             let (reached, memory) = (psnr >= asked, verify::memory(&bundle)?);
             // Memory is no matter until there is one that reaches it.
             if first || (reached && nearest < asked) {
@@ -341,7 +347,7 @@ impl Search<'_> {
             let wanted = atlas::Settings { density: source.density * ratio, ..source };
             let flat = self.flat(wanted)?;
             if turn == 0 {
-                source.density *= flat.atlas.figures.scale;
+                source.density *= flat.atlas.figures.scale.min(1.0);
                 for settings in self.grids(wanted) {
                     let settings = Settings { error: self.prunes(metrics::mse(asked)), ..settings };
                     if let Some(found) = score(&flat, &settings, true)?

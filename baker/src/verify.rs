@@ -212,7 +212,10 @@ pub(crate) fn probe(bytes: &[u8], frames: &[u32], mut show: impl FnMut(u32, &[[f
 /// Frame `frame` as exact rays see it through the source image, nearest texel: R, G, B, row by row.
 #[must_use]
 pub fn exact_frame(atlas: &Atlas, frame: u32) -> Vec<u8> {
-    let (image, gbuffer) = (&atlas.image, &atlas.gbuffer);
+    looked_up(&atlas.image, &atlas.gbuffer, frame)
+}
+
+fn looked_up(image: &SourceImage, gbuffer: &GBuffer, frame: u32) -> Vec<u8> {
     gbuffer.uv[pixels_of(gbuffer, frame)].iter().flat_map(|&uv| image.colour_at(uv)).collect()
 }
 
@@ -260,8 +263,20 @@ struct Sums {
 /// # Errors
 /// [`VerifyError`] where the player refuses the bytes or they are of another size.
 pub fn against_exact(bytes: &[u8], atlas: &Atlas, progress: &(dyn Fn(u32, u32) + Sync)) -> Result<Quality, VerifyError> {
+    through(bytes, &atlas.image, &atlas.gbuffer, progress)
+}
+
+/// The same with a source image that has other colours than the one that the G-buffer came with.
+///
+/// # Errors
+/// The same.
+pub(crate) fn through(
+    bytes: &[u8],
+    image: &SourceImage,
+    gbuffer: &GBuffer,
+    progress: &(dyn Fn(u32, u32) + Sync),
+) -> Result<Quality, VerifyError> {
     let bundle = Bundle::parse(bytes)?;
-    let gbuffer = &atlas.gbuffer;
     let (width, height) = bundle.size();
     let (expected, found) = ([gbuffer.width, gbuffer.height, gbuffer.frames], [width, height, bundle.frames()]);
     if expected != found {
@@ -276,7 +291,7 @@ pub fn against_exact(bytes: &[u8], atlas: &Atlas, progress: &(dyn Fn(u32, u32) +
                 let mut played = Vec::new();
                 for frame in run * RUN..((run + 1) * RUN).min(gbuffer.frames) {
                     screen.play(frame, &mut played);
-                    sums.add(&mut screen, &played, atlas, frame);
+                    sums.add(&mut screen, &played, (image, gbuffer), frame);
                     progress(done.fetch_add(1, Ordering::Relaxed) + 1, gbuffer.frames);
                 }
                 sums
@@ -302,10 +317,9 @@ pub fn against_exact(bytes: &[u8], atlas: &Atlas, progress: &(dyn Fn(u32, u32) +
 
 impl Sums {
     /// Adds the current frame of `screen`, whose pixels are `played`.
-    fn add(&mut self, screen: &mut Screen<'_, '_>, played: &[u8], atlas: &Atlas, frame: u32) {
-        let (image, gbuffer) = (&atlas.image, &atlas.gbuffer);
+    fn add(&mut self, screen: &mut Screen<'_, '_>, played: &[u8], (image, gbuffer): (&SourceImage, &GBuffer), frame: u32) {
         let (width, pixels) = (gbuffer.width as usize, pixels_of(gbuffer, frame));
-        let exact = exact_frame(atlas, frame);
+        let exact = looked_up(image, gbuffer, frame);
         self.psnr.push(metrics::psnr(metrics::mean_squared_error(played, &exact)));
         self.ssim.push(metrics::ssim(played, &exact, width));
         let mut probes = vec![Probe::default(); width];

@@ -4,7 +4,9 @@
 use anyhow::{Context, Result};
 use cubist_baker::atlas::Storage;
 use cubist_baker::bake::{self, Encoded, Flat, Settings};
+use cubist_baker::repaint::Painter;
 use cubist_baker::scene::{Scene, builtin};
+use cubist_baker::truth::Truth;
 
 /// The screen of the reduced setting, pixels.
 pub const SIZE: [u32; 2] = [160, 120];
@@ -55,10 +57,24 @@ pub fn raw_and_packed(scene: &Scene, settings: &Settings) -> Result<(Flat, [Vec<
     Ok((flat, [raw.bundle, packed.bundle]))
 }
 
+/// The same, its texels coloured by what is played.
+///
+/// # Errors
+/// Those of the baker, with the scene's name.
+pub fn painted(scene: &Scene, settings: &Settings) -> Result<(Flat, Encoded)> {
+    let (mut flat, mut encoded) = bake(scene, settings)?;
+    let painter = Painter::new(&Truth::new(scene), &|_, _| {});
+    let painted = painter.painted(&encoded.bundle, &flat.atlas.image, &settings.atlas).with_context(|| format!("paint {}", scene.name))?;
+    if let Some((bundle, image)) = painted {
+        (encoded.bundle, flat.atlas.image) = (bundle, image);
+    }
+    Ok((flat, encoded))
+}
+
 /// The bytes of the bundle of the built-in scene `name` at `size` and `frames`.
 ///
 /// # Errors
-/// Those of [`reduced`] and [`bake()`].
+/// Those of [`reduced`] and [`painted`].
 pub fn bundle(name: &str, size: [u32; 2], frames: u32, settings: &Settings) -> Result<Vec<u8>> {
-    Ok(bake(&reduced(name, size, frames)?, settings)?.1.bundle)
+    Ok(painted(&reduced(name, size, frames)?, settings)?.1.bundle)
 }

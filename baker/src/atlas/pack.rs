@@ -5,16 +5,16 @@ use super::footprint::Footprints;
 use super::mask::Mask;
 use super::place::Place;
 use super::strip::{Shape, Spot, Strip};
-use crate::chart::Charting;
+use crate::chart::{Chart, Charting};
 use cubist_core::window::Window;
 use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::ops::Range;
 
-/// Texels between charts: as many as bilinear lookup needs to meet no neighbour, and none where nothing else fits.
-const NARROW: [u32; 2] = [2, 0];
-/// Texels between charts where they make the image no larger.
-const WIDE: [u32; 3] = [6, 4, 3];
+/// Texels between charts: one, so that what lies just beyond an edge is not another chart, and none where nothing else fits.
+const NARROW: [u32; 2] = [1, 0];
+/// Texels between charts where they make the image no larger. Two are as many as bilinear lookup needs to meet no neighbour.
+const WIDE: [u32; 4] = [6, 4, 3, 2];
 /// A narrow gutter has to make the image this much denser than a wide one does to be preferred, where not all the density fits.
 const WORTH: f64 = 1.07;
 /// Scales tried beyond what bisection finds, a hundredth apart: what fits at one scale may not fit at a smaller one.
@@ -30,11 +30,15 @@ const ROWS: [u32; 3] = [16, 64, 128];
 const RIM_ROWS: u32 = 4;
 /// Images of fewer rows than this are not: it would be too much of them.
 const SMALL: u32 = 128;
+/// Scales tried where everything fits and the image has room left, the largest first: texels that cost nothing.
+const FREE: [f64; 9] = [1.4, 1.32, 1.25, 1.19, 1.14, 1.1, 1.06, 1.03, 1.01];
 /// Orders for searching a scale; all are tried at the scale found.
 const QUICK: usize = 3;
 /// Shuffled orders, fewer where there are many charts to lay down in each.
 const SHUFFLED: usize = 40;
 const CHARTS: usize = 8192;
+/// Times that a chart is laid down earlier because there was no room for it, at most.
+const PROMOTIONS: usize = 200;
 
 /// Where everything lies.
 pub(crate) struct Layout {
@@ -44,6 +48,8 @@ pub(crate) struct Layout {
     pub scale: f64,
     /// Texels between charts.
     pub gutter: u32,
+    /// Texels between charts and the image's edges.
+    rim: u32,
     /// The background's rectangle.
     pub backdrop: [u32; 4],
     /// One for each chart.
@@ -95,16 +101,38 @@ impl Items {
     }
 
     /// Lays everything down in order `order`, so many texels between charts and around them all; the height, and the spots.
-    fn lay(&self, order: usize, [width, height]: [u32; 2], [gutter, rim]: [u32; 2]) -> Option<(u32, Vec<Spot>)> {
+    fn lay(&self, order: usize, size: [u32; 2], apart: [u32; 2]) -> Option<(u32, Vec<Spot>)> {
+        self.lay_in(&self.orders[order], size, apart).ok()
+    }
+
+    /// The same in any order; or the place in it of the first that there is no room for.
+    fn lay_in(&self, order: &[usize], [width, height]: [u32; 2], [gutter, rim]: [u32; 2]) -> Result<(u32, Vec<Spot>), usize> {
         if self.area > u64::from(width) * u64::from(height) {
-            return None;
+            return Err(0);
         }
         let mut strip = Strip::new(width, height, gutter, rim);
         let mut spots = vec![Spot { x: 0, y: 0, turns: 0 }; self.shapes.len()];
-        for &i in &self.orders[order] {
-            spots[i] = strip.place(&self.shapes[i])?;
+        for (at, &i) in order.iter().enumerate() {
+            spots[i] = strip.place(&self.shapes[i]).ok_or(at)?;
         }
-        Some((strip.height, spots))
+        Ok((strip.height, spots))
+    }
+
+    /// The spots in an image of this size, in the first of a few orders in which everything fits: of all orders there are, or of such that come about
+    /// when what finds no room is laid down earlier, again and again (D. Joslin and D. Clements, "Squeaky wheel optimization", 1999).
+    fn at_all(&self, size: [u32; 2], apart: [u32; 2]) -> Option<Vec<Spot>> {
+        let eager = |order: usize| {
+            let mut order = self.orders[order].clone();
+            for _ in 0..(CHARTS / order.len()).min(PROMOTIONS) {
+                match self.lay_in(&order, size, apart) {
+                    Ok((_, spots)) => return Some(spots),
+                    Err(0) => return None,
+                    Err(at) => order[at / 2..=at].rotate_right(1),
+                }
+            }
+            None
+        };
+        self.in_any_order(usize::MAX, size, apart).or_else(|| (0..QUICK).into_par_iter().find_map_first(eager))
     }
 
     /// The spots in an image of this size, in the first of so many orders in which everything fits.
@@ -151,9 +179,25 @@ fn worth([width, height]: [u32; 2]) -> u32 {
     width * height + if windowed([width, height]) { 0 } else { WINDOWED }
 }
 
+/// The sides of a chart, texels.
+fn sides(chart: &Chart) -> [f64; 2] {
+    [0, 1].map(|k| (chart.hi[k] - chart.lo[k]) * chart.density)
+}
+
 /// Sizes of the charts in texels at a scale.
 fn sizes(charting: &Charting, scale: f64, most: u32) -> Vec<[u32; 2]> {
-    charting.charts.iter().map(|c| [0, 1].map(|k| texels((c.hi[k] - c.lo[k]) * c.density, scale, most))).collect()
+    charting.charts.iter().map(|chart| sides(chart).map(|side| texels(side, scale, most))).collect()
+}
+
+/// The same at a scale of at least 1, but charts larger than a room get no larger than that.
+fn sizes_within(charting: &Charting, scale: f64, room: [u32; 2]) -> Vec<[u32; 2]> {
+    let (short, long) = (f64::from(room[0].min(room[1])), f64::from(room[0].max(room[1])));
+    let of = |chart: &Chart| {
+        let [a, b] = sides(chart);
+        let most = (long / a.max(b)).min(short / a.min(b)).max(1.0);
+        [a, b].map(|side| texels(side, scale.min(most), room[0].max(room[1])))
+    };
+    charting.charts.iter().map(of).collect()
 }
 
 fn texels(length: f64, scale: f64, most: u32) -> u32 {
@@ -187,6 +231,13 @@ pub(super) fn pack(footprints: &Footprints<'_>, backdrop: [u32; 2], max_side: u3
     NARROW.into_iter().find_map(|gutter| Packing { footprints, backdrop, max_side }.with(gutter))
 }
 
+/// Everything once more, as much finer as there is room for in the image that `layout` takes anyhow; it has all the density. Charts as wide or high as
+/// the image stay as they are.
+pub(super) fn filled(footprints: &Footprints<'_>, backdrop: [u32; 2], max_side: u32, layout: Layout) -> Layout {
+    let packing = Packing { footprints, backdrop, max_side };
+    FREE.into_iter().find_map(|scale| packing.finer(&layout, scale)).unwrap_or(layout)
+}
+
 /// What there is to pack, and the room for it.
 struct Packing<'a> {
     footprints: &'a Footprints<'a>,
@@ -203,11 +254,16 @@ impl Packing<'_> {
     /// The masks at a scale. What is seen but not drawn is little, and asking all samples for it takes long.
     fn items(&self, scale: f64, seen: bool) -> Items {
         let [side, _] = self.room();
-        let mut masks = self.footprints.drawn(&sizes(self.footprints.charting, scale, side), scale);
+        self.items_of(&sizes(self.footprints.charting, scale, side), scale, seen)
+    }
+
+    /// The masks of charts of `sizes`.
+    fn items_of(&self, sizes: &[[u32; 2]], scale: f64, seen: bool) -> Items {
+        let mut masks = self.footprints.drawn(sizes, scale);
         if seen {
             self.footprints.add_seen(&mut masks);
         }
-        Items::new(scaled(self.backdrop, scale, side), &masks)
+        Items::new(scaled(self.backdrop, scale.min(1.0), self.room()[0]), &masks)
     }
 
     /// Everything at least `gutter` texels apart.
@@ -232,6 +288,15 @@ impl Packing<'_> {
         None
     }
 
+    /// The layout at a larger scale, if that fits the same image.
+    fn finer(&self, layout: &Layout, scale: f64) -> Option<Layout> {
+        let size = [layout.width, layout.height];
+        let sizes = sizes_within(self.footprints.charting, scale, size.map(|side| side - 2 * layout.rim));
+        let items = self.items_of(&sizes, scale, true);
+        let spots = items.at_all(size, [NARROW[0], layout.rim])?;
+        Some(self.wider(&items, size, spots, scale, [NARROW[0], layout.rim]))
+    }
+
     /// Takes more room around and between charts where it is free, or next to it: at the picture's edges players draw pixel by pixel, and what is thought to
     /// lie beyond a chart should not fall on another.
     fn settled(&self, items: &Items, size: [u32; 2], spots: Vec<Spot>, scale: f64, gutter: u32) -> Layout {
@@ -241,14 +306,26 @@ impl Packing<'_> {
         let mut sizes = heights.into_iter().flatten().filter(|_| gutter > 0).map(|height| [width, height]);
         let rimmed = sizes.find_map(|size| Some((size, items.in_any_order(QUICK, size, [gutter, 1])?)));
         let (rim, (size, spots)) = rimmed.map_or((0, (size, spots)), |found| (1, found));
+        self.wider(items, size, spots, scale, [gutter, rim])
+    }
+
+    /// The layout, with more room between charts where it is free.
+    fn wider(&self, items: &Items, size: [u32; 2], spots: Vec<Spot>, scale: f64, [gutter, rim]: [u32; 2]) -> Layout {
         let mut wider = WIDE.into_iter().filter(|&wide| wide > gutter);
         let found = wider.find_map(|wide| Some((wide, items.in_any_order(usize::MAX, size, [wide, rim])?)));
         let (gutter, spots) = found.unwrap_or((gutter, spots));
-        finish(self.footprints.charting, &items.sizes, &spots, size, scale, gutter)
+        finish(self.footprints.charting, &items.sizes, &spots, size, scale, [gutter, rim])
     }
 }
 
-fn finish(charting: &Charting, sizes: &[[u32; 2]], spots: &[Spot], [width, height]: [u32; 2], scale: f64, gutter: u32) -> Layout {
+fn finish(
+    charting: &Charting,
+    sizes: &[[u32; 2]],
+    spots: &[Spot],
+    [width, height]: [u32; 2],
+    scale: f64,
+    [gutter, rim]: [u32; 2],
+) -> Layout {
     let rect = |(&[w, h], &Spot { x, y, turns }): (&[u32; 2], &Spot)| {
         let [w, h] = if turns % 2 == 1 { [h, w] } else { [w, h] };
         [x, y, x + w, y + h]
@@ -257,5 +334,5 @@ fn finish(charting: &Charting, sizes: &[[u32; 2]], spots: &[Spot], [width, heigh
     // Each direction is stretched to whole texels: the outline of a rectangle is then the chart's own.
     let places =
         charting.charts.iter().zip(rects.iter().zip(spots).skip(1)).map(|(c, (&rect, spot))| Place::new(rect, c.lo, c.hi, spot.turns));
-    Layout { width, height, scale, gutter, backdrop: rects[0], places: places.collect() }
+    Layout { width, height, scale, gutter, rim, backdrop: rects[0], places: places.collect() }
 }

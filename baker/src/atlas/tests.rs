@@ -320,8 +320,8 @@ fn charts_are_packed_tightly() {
     let scene = scene(triangles, Vec::new(), Material::default());
     let atlas = made(&scene, &hits(&scene));
     println!("{:?}: {} x {}", atlas.figures, atlas.image.width, atlas.image.height);
-    assert!(atlas.figures.charts > 10 && atlas.figures.gutter >= 2 && atlas.figures.scale == 1.0);
-    assert!(atlas.figures.fill > 0.4, "{:?}", atlas.figures);
+    assert!(atlas.figures.charts > 10 && atlas.figures.gutter >= 1 && atlas.figures.scale >= 1.0);
+    assert!(atlas.figures.fill > 0.5, "{:?}", atlas.figures);
 }
 
 /// A narrow band along two sides of a square floor: most of the rectangle around it is empty.

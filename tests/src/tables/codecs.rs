@@ -45,7 +45,7 @@ struct Ours {
 /// The baker's, those of temporary files, and what ffmpeg says.
 pub fn measure(scene: &Scene, ffmpeg: Option<&Ffmpeg>) -> Result<Vec<Value>> {
     eprintln!("{}: baking", scene.name);
-    let (flat, encoded) = scenes::bake(scene, &Settings::default())?;
+    let (flat, encoded) = scenes::painted(scene, &Settings::default())?;
     eprintln!("{}: rendering the truth", scene.name);
     let shape = Shape::of(scene);
     let folder = tempfile::tempdir().context("make a temporary folder")?;

@@ -32,7 +32,7 @@ struct Drawn {
 /// The baker's.
 pub fn measure(scene: &Scene) -> Result<Value> {
     eprintln!("{}: baking", scene.name);
-    let (_, encoded) = scenes::bake(scene, &Settings::default())?;
+    let (_, encoded) = scenes::painted(scene, &Settings::default())?;
     eprintln!("{}: comparing", scene.name);
     let truth = Truth::new(scene);
     let frames = spread(scene.playback.frames, COMPARED);
