@@ -188,7 +188,7 @@ pub struct Figures {
     pub crowded: usize,
     /// Share of texels covered.
     pub fill: f64,
-    /// The densities were multiplied by this: below 1 to make everything fit, above to fill the image, by a quarter at most.
+    /// The densities were multiplied by this: below 1 to make everything fit, above to fill the image with charts that bytes were saved on.
     pub scale: f64,
     /// Texels between charts.
     pub gutter: u32,
@@ -231,13 +231,9 @@ pub fn build(scene: &Scene, hits: &Hits, settings: &Settings, progress: &(dyn Fn
     }
     let chart::Labels { of: label_of, count: labels, crowded } = chart::assign(hits, &charting, MOST_LABELS - 1);
     let layout = pack(&charting).ok_or(AtlasError::Room { charts: charting.charts.len(), side: settings.max_side })?;
-    // Texels of a texture are copied one by one.
-    let stretches = charting.charts.iter().all(|chart| !matches!(chart.projection, chart::Projection::Texture));
     let layout = match settings.storage {
-        Storage::Raw if stretches && layout.scale >= 1.0 => {
-            pack::filled(&footprint::Footprints::new(scene, hits, &charting), backdrop, settings.max_side, layout)
-        }
-        _ => layout,
+        Storage::Raw => pack::filled(&footprint::Footprints::new(scene, hits, &charting), backdrop, settings.max_side, layout),
+        Storage::Packed => layout,
     };
     progress(2, 4);
     let fixed = fixed(scene, &layout.backdrop);

@@ -189,12 +189,12 @@ fn sizes(charting: &Charting, scale: f64, most: u32) -> Vec<[u32; 2]> {
     charting.charts.iter().map(|chart| sides(chart).map(|side| texels(side, scale, most))).collect()
 }
 
-/// The same at a scale of at least 1, but charts larger than a room get no larger than that.
+/// The same at a scale of at least 1, but no chart gets finer than it can be made use of, nor larger than a room.
 fn sizes_within(charting: &Charting, scale: f64, room: [u32; 2]) -> Vec<[u32; 2]> {
     let (short, long) = (f64::from(room[0].min(room[1])), f64::from(room[0].max(room[1])));
     let of = |chart: &Chart| {
         let [a, b] = sides(chart);
-        let most = (long / a.max(b)).min(short / a.min(b)).max(1.0);
+        let most = (long / a.max(b)).min(short / a.min(b)).min(chart.finest / chart.density).max(1.0);
         [a, b].map(|side| texels(side, scale.min(most), room[0].max(room[1])))
     };
     charting.charts.iter().map(of).collect()
@@ -231,11 +231,13 @@ pub(super) fn pack(footprints: &Footprints<'_>, backdrop: [u32; 2], max_side: u3
     NARROW.into_iter().find_map(|gutter| Packing { footprints, backdrop, max_side }.with(gutter))
 }
 
-/// Everything once more, as much finer as there is room for in the image that `layout` takes anyhow; it has all the density. Charts as wide or high as
-/// the image stay as they are.
+/// Everything once more, as much finer as there is room for in the image that `layout` takes anyhow; it has all the density that is worth its bytes. Charts
+/// that have all that can be seen, and those as wide or high as the image, stay as they are.
 pub(super) fn filled(footprints: &Footprints<'_>, backdrop: [u32; 2], max_side: u32, layout: Layout) -> Layout {
     let packing = Packing { footprints, backdrop, max_side };
-    FREE.into_iter().find_map(|scale| packing.finer(&layout, scale)).unwrap_or(layout)
+    let spares = footprints.charting.charts.iter().any(|chart| chart.finest > chart.density);
+    let scales = FREE.into_iter().filter(|_| spares && layout.scale >= 1.0);
+    scales.map(|scale| packing.finer(&layout, scale)).find_map(|finer| finer).unwrap_or(layout)
 }
 
 /// What there is to pack, and the room for it.

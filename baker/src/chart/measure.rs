@@ -137,7 +137,8 @@ pub(super) fn measure(scene: &Scene, hits: &Hits, charting: &mut Charting, densi
     for (i, chart) in charting.charts.iter_mut().enumerate() {
         let mut figures = Figures::new();
         tables.iter().filter_map(|t| t[i].as_ref()).for_each(|f| figures.merge(f));
-        settle(chart, &figures, &turns, density.most * figures.density(areas[i], density), max_side);
+        let densities = [figures.density(areas[i], density), figures.closest()].map(|of| density.most * of);
+        settle(chart, &figures, &turns, densities, max_side);
     }
     charting.flatten(scene);
     snap(charting);
@@ -153,8 +154,8 @@ fn areas(charting: &Charting) -> Vec<f64> {
     areas
 }
 
-/// Turns the chart into its smallest rectangle and sets its density: `density`, or as much as fits.
-fn settle(chart: &mut Chart, figures: &Figures, turns: &[[f64; 2]; TURNS], density: f64, max_side: u32) {
+/// Turns the chart into its smallest rectangle and sets its densities, what is worth its bytes and the finest, or as much as fits.
+fn settle(chart: &mut Chart, figures: &Figures, turns: &[[f64; 2]; TURNS], densities: [f64; 2], max_side: u32) {
     let side = |k: usize| figures.reach[k] + figures.reach[TURNS + k];
     let area = |k: usize| side(k) * side(k + TURNS / 2);
     // Level charts give straight spans: another direction has to earn it.
@@ -174,7 +175,7 @@ fn settle(chart: &mut Chart, figures: &Figures, turns: &[[f64; 2]; TURNS], densi
     chart.hi = [figures.reach[k], figures.reach[l]];
     let longest = side(k).max(side(l)).max(f64::MIN_POSITIVE);
     // A plane that runs from the camera to the horizon would fill any image.
-    chart.density = density.min(f64::from(max_side) / longest).max(1e-9);
+    [chart.density, chart.finest] = densities.map(|density| density.min(f64::from(max_side) / longest).max(1e-9));
 }
 
 /// Extends bounds that end within two texels of the chart's faces to the faces' end: an outline that is seen is kept.

@@ -59,6 +59,8 @@ pub struct Chart {
     pub projection: Projection,
     /// Texels wanted per unit of flattened length.
     pub density: f64,
+    /// The same if bytes did not matter.
+    pub finest: f64,
     /// Smallest flattened coordinates that are seen.
     pub lo: [f64; 2],
     /// Largest flattened coordinates that are seen.
@@ -237,7 +239,7 @@ pub fn build(scene: &Scene, hits: &Hits, family: Family, density: &Density, max_
     if own {
         let mut charting = islands::build(scene, hits, faces);
         // The scene's own texels are the finest there are.
-        charting.charts.iter_mut().for_each(|chart| chart.density *= density.most.min(1.0));
+        charting.charts.iter_mut().for_each(|chart| (chart.density, chart.finest) = (density.most.min(1.0), density.most.min(1.0)));
         return charting;
     }
     let islands = if family == Family::Own { Islands::new(scene).ok() } else { None };
@@ -257,6 +259,7 @@ pub fn build(scene: &Scene, hits: &Hits, family: Family, density: &Density, max_
         let chart = |(view, depth): (&View, f64)| Chart {
             projection: view.projection(depth),
             density: density.most,
+            finest: density.most,
             lo: [0.0; 2],
             hi: [0.0; 2],
             hits: 0,
