@@ -7,7 +7,7 @@ use crate::bake::{BakeError, Flat, Progress, Settings};
 use crate::climb::{Free, Step, climb};
 use crate::made::Made;
 use crate::scene::Scene;
-use crate::verify::Quality;
+use crate::verify::Brief;
 
 /// Wrong pixels, percent, from which on smaller cells are worth a try. Most scenes have a tenth of that.
 const TORN: f64 = 2.0;
@@ -55,7 +55,7 @@ impl Other {
 type Climb = (&'static [Step], usize);
 
 /// The climbs worth a try after cells of `cell` pixels gave `quality`, the second one if the first leads nowhere; and why.
-fn climbs(cell: u32, quality: &Quality) -> Option<(&'static [Climb], &'static str)> {
+fn climbs(cell: u32, quality: &Brief) -> Option<(&'static [Climb], &'static str)> {
     // Smaller cells are there for the picture: keys still farther apart would take that back.
     const FINER: Climb = (&[Step::FINER], 1);
     const FARTHER: Climb = (&[Step::DOUBLE], 1);
@@ -87,7 +87,7 @@ pub(crate) fn choose(
     scene: &Scene,
     flat: &Flat,
     usual: Made,
-    all: &Quality,
+    all: &Brief,
     progress: Progress<'_>,
 ) -> Result<(Made, Option<Other>), BakeError> {
     let Some((climbs, why)) = climbs(usual.settings.cell, all) else { return Ok((usual, None)) };
@@ -202,7 +202,7 @@ mod tests {
     fn what_is_tried_depends_on_outlines_and_bends() {
         let tried = |cell, wrong_surface_percent, p99| {
             let path_error_texels = verify::PathError { p99, ..verify::PathError::default() };
-            climbs(cell, &Quality { wrong_surface_percent, path_error_texels, ..Quality::default() })
+            climbs(cell, &Brief { wrong_surface_percent, path_error_texels, ..Brief::default() })
                 .map(|(climbs, why)| (climbs.len(), why.split(' ').next().unwrap()))
         };
         // Torn and steady, torn and not quite so, both torn and bent, the last in large cells; bent; neither; steady.

@@ -6,13 +6,13 @@ use crate::metrics;
 use crate::report::grouped;
 use crate::scene::Scene;
 use crate::spare::DOUBLE;
-use crate::verify::{self, Quality};
+use crate::verify::{self, Brief};
 
 /// A bundle, what made it, and how good it is.
 pub(crate) struct Made {
     pub settings: Settings,
     pub encoded: Encoded,
-    pub quality: Quality,
+    pub quality: Brief,
 }
 
 impl Made {
@@ -22,7 +22,7 @@ impl Made {
     /// Those of encoding, and of the player.
     pub fn new(scene: &Scene, flat: &Flat, settings: Settings) -> Result<Self, BakeError> {
         let encoded = bake::encode(scene, flat, &settings, &|_, _| {})?;
-        let quality = verify::against_exact(&encoded.bundle, &flat.atlas, &|_, _| {})?;
+        let quality = verify::briefly(&encoded.bundle, &flat.atlas.image, &flat.atlas.gbuffer)?;
         Ok(Self { settings, encoded, quality })
     }
 

@@ -327,8 +327,7 @@ impl Search<'_> {
             let Some(Encoded { bundle, .. }) = possible(self.encode(flat, settings), &mut exceeded)? else { return Ok(None) };
             let painted = painter.as_ref().map_or(Ok(None), |painter| painter.painted(&bundle, &flat.atlas.image, &settings.atlas))?;
             let (bundle, image) = painted.map_or((bundle, None), |(bundle, image)| (bundle, Some(image)));
-            let quality = verify::through(&bundle, image.as_ref().unwrap_or(&flat.atlas.image), &flat.atlas.gbuffer, &|_, _| {})?;
-            let psnr = quality.psnr_mean;
+            let psnr = verify::briefly(&bundle, image.as_ref().unwrap_or(&flat.atlas.image), &flat.atlas.gbuffer)?.psnr_mean;
             let (reached, memory) = (psnr >= asked, verify::memory(&bundle)?);
             // Memory is no matter until there is one that reaches it.
             if first || (reached && nearest < asked) {

@@ -68,6 +68,17 @@ pub struct Quality {
     pub path_error_texels: PathError,
 }
 
+/// The part of [`Quality`] that choices are told by, and that takes least time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Brief {
+    /// Mean of the frames' PSNR, dB.
+    pub psnr_mean: f64,
+    /// Share of pixels that show another surface than the exact ray hits, %.
+    pub wrong_surface_percent: f64,
+    /// How far the played paths are off.
+    pub path_error_texels: PathError,
+}
+
 /// Playback against the antialiased scene itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TruthQuality {
@@ -247,7 +258,7 @@ fn texels(at: PlayUv) -> [f32; 2] {
     [at.u, at.v].map(|x| x as f32 / (1u32 << PLAY_BITS) as f32)
 }
 
-/// What one run of frames adds up to; the lists have an entry a frame.
+/// What one run of frames adds up to; the lists have an entry a frame, or none where they are not asked for.
 #[derive(Default)]
 struct Sums {
     psnr: Vec<f64>,
@@ -263,17 +274,23 @@ struct Sums {
 /// # Errors
 /// [`VerifyError`] where the player refuses the bytes or they are of another size.
 pub fn against_exact(bytes: &[u8], atlas: &Atlas, progress: &(dyn Fn(u32, u32) + Sync)) -> Result<Quality, VerifyError> {
-    through(bytes, &atlas.image, &atlas.gbuffer, progress)
+    compare(bytes, (&atlas.image, &atlas.gbuffer), true, progress)
 }
 
-/// The same with a source image that has other colours than the one that the G-buffer came with.
+/// The part of it that choices are told by; `image` may have other colours than the one that the G-buffer came with.
 ///
 /// # Errors
 /// The same.
-pub(crate) fn through(
+pub(crate) fn briefly(bytes: &[u8], image: &SourceImage, gbuffer: &GBuffer) -> Result<Brief, VerifyError> {
+    let Quality { psnr_mean, wrong_surface_percent, path_error_texels, .. } = compare(bytes, (image, gbuffer), false, &|_, _| {})?;
+    Ok(Brief { psnr_mean, wrong_surface_percent, path_error_texels })
+}
+
+/// The figures of both; SSIM and bilinear lookup are left out unless `all` are asked for.
+fn compare(
     bytes: &[u8],
-    image: &SourceImage,
-    gbuffer: &GBuffer,
+    (image, gbuffer): (&SourceImage, &GBuffer),
+    all: bool,
     progress: &(dyn Fn(u32, u32) + Sync),
 ) -> Result<Quality, VerifyError> {
     let bundle = Bundle::parse(bytes)?;
@@ -291,7 +308,7 @@ pub(crate) fn through(
                 let mut played = Vec::new();
                 for frame in run * RUN..((run + 1) * RUN).min(gbuffer.frames) {
                     screen.play(frame, &mut played);
-                    sums.add(&mut screen, &played, (image, gbuffer), frame);
+                    sums.add(&mut screen, &played, (image, gbuffer), frame, all);
                     progress(done.fetch_add(1, Ordering::Relaxed) + 1, gbuffer.frames);
                 }
                 sums
@@ -300,9 +317,9 @@ pub(crate) fn through(
         .collect::<Result<_, _>>()?;
     let mut path = Histogram::default();
     runs.iter().for_each(|run| path.merge(&run.path));
-    let all = |list: fn(&Sums) -> &Vec<f64>| runs.iter().flat_map(list).copied();
-    let mean = |list: fn(&Sums) -> &Vec<f64>| all(list).sum::<f64>() / f64::from(gbuffer.frames.max(1));
-    let (worst_frame, psnr_min) = (0..).zip(all(|run| &run.psnr)).min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, metrics::PERFECT));
+    let listed = |list: fn(&Sums) -> &Vec<f64>| runs.iter().flat_map(list).copied();
+    let mean = |list: fn(&Sums) -> &Vec<f64>| listed(list).sum::<f64>() / f64::from(gbuffer.frames.max(1));
+    let (worst_frame, psnr_min) = (0..).zip(listed(|run| &run.psnr)).min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, metrics::PERFECT));
     let wrong: u64 = runs.iter().map(|run| run.wrong).sum();
     Ok(Quality {
         psnr_mean: mean(|run| &run.psnr),
@@ -317,11 +334,13 @@ pub(crate) fn through(
 
 impl Sums {
     /// Adds the current frame of `screen`, whose pixels are `played`.
-    fn add(&mut self, screen: &mut Screen<'_, '_>, played: &[u8], (image, gbuffer): (&SourceImage, &GBuffer), frame: u32) {
+    fn add(&mut self, screen: &mut Screen<'_, '_>, played: &[u8], (image, gbuffer): (&SourceImage, &GBuffer), frame: u32, all: bool) {
         let (width, pixels) = (gbuffer.width as usize, pixels_of(gbuffer, frame));
         let exact = looked_up(image, gbuffer, frame);
         self.psnr.push(metrics::psnr(metrics::mean_squared_error(played, &exact)));
-        self.ssim.push(metrics::ssim(played, &exact, width));
+        if all {
+            self.ssim.push(metrics::ssim(played, &exact, width));
+        }
         let mut probes = vec![Probe::default(); width];
         let charts = screen.charts(image);
         let mut squares = 0f64;
@@ -339,12 +358,17 @@ impl Sums {
                 } else {
                     self.wrong += 1;
                 }
+                if !all {
+                    continue;
+                }
                 let (a, b) = (bilinear(image, usize::from(probe.label), at), bilinear(image, usize::from(label), exact));
                 row += a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f32>();
             }
             squares += f64::from(row);
         }
-        self.bilinear.push(metrics::psnr(squares / (played.len().max(1) as f64)));
+        if all {
+            self.bilinear.push(metrics::psnr(squares / (played.len().max(1) as f64)));
+        }
     }
 }
 
