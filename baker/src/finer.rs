@@ -25,7 +25,7 @@ const FLICKER: f64 = 1.25;
 const STEADILY: &str = "surfaces go straight on from key to key";
 const TURNING: &str = "outlines turn on their way from key to key";
 /// What closer keys have to gain there, dB: they take time in every frame.
-const TIME: f64 = 0.1;
+const TIME: f64 = 0.2;
 /// Frames between keys, at least, where nothing bends: keys closer than that take more of every frame's time than all else.
 const CLOSEST: u32 = 4;
 /// Steps tried where positions bend, at most: fast turns want keys much closer.

@@ -14,7 +14,7 @@ const COARSER: [f32; 3] = [0.05, 0.2, 1.0];
 /// Frames compared.
 const COMPARED: u32 = 16;
 /// What twice the bytes of a bundle's keys have to bring, dB against exact rays.
-pub(crate) const DOUBLE: f64 = 1.6;
+pub(crate) const DOUBLE: f64 = 1.55;
 
 /// The bundle among those that `code` makes, at what a bit is worth, that is worth most; `picture`: bytes that are not keys. Stops where coarser
 /// is no better.
