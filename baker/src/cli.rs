@@ -159,7 +159,7 @@ pub struct Bake {
     ///
     /// Played: the mean of what the scene has in the pixels that show a texel, the colour with which nearest texels come closest to it: .4 to 2.5 dB closer
     /// to the antialiased scene for the same bytes, most where detail is finer than a pixel. Looks at 128 frames, which takes a second or two. Surface:
-    /// what lies there, as the scene has it.
+    /// what lies there, as the scene has it; where textures have sharp edges, rows with bilinear texels are .2 to 1.7 dB better so.
     #[arg(long, value_enum, value_name = "KIND", default_value_t = Paint::Played)]
     pub paint: Paint,
     /// Every Nth key needs no earlier one: a seek decodes at most N + 1 keys.
