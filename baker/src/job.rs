@@ -15,6 +15,7 @@ use crate::scene::Scene;
 use crate::straight;
 use crate::truth::{Truth, spread};
 use crate::{tune, verify};
+use std::cell::LazyCell;
 use std::time::Instant;
 
 /// Screens wider than this get cells of 16 pixels unless told otherwise.
@@ -236,7 +237,8 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
     let (mut made, spaces) = if bends { straight::choose(scene, &flat, made, progress)? } else { (made, Vec::new()) };
     let finer = other.map(|other| other.said(&made));
     let (search_seconds, paint_start) = (search_seconds + finer_start.elapsed().as_secs_f64(), Instant::now());
-    let truth = Truth::new(scene);
+    // Its hierarchy is built where somebody looks at it only.
+    let truth = LazyCell::new(|| Truth::new(scene));
     let repainted = !options.plain && Painter::new(&truth, progress).repaint(&mut made, &mut flat.atlas, options.goal)?;
     let (paint_seconds, verify_start) = (paint_start.elapsed().as_secs_f64(), Instant::now());
     let Made { settings, encoded, .. } = made;

@@ -50,6 +50,11 @@ impl Shown {
     }
 }
 
+/// The squared error of all pixels if texels had `colours`, less a part that no colours change.
+fn error(shown: &[Shown], colours: impl Iterator<Item = [u8; 3]>) -> f64 {
+    shown.iter().zip(colours).map(|(shown, colour)| shown.error(colour)).sum()
+}
+
 /// What the scene has in the pixels of some frames.
 pub struct Painter {
     frames: Vec<u32>,
@@ -117,10 +122,8 @@ impl Painter {
         let seen: Vec<u32> = shown.iter().map(|shown| shown.pixels as u32).collect();
         let (texels, palette) = atlas::reduced(&wanted, &seen, settings);
         let painted = SourceImage { texels, palette, ..image.clone() };
-        let error =
-            |colours: &mut dyn Iterator<Item = [u8; 3]>| shown.iter().zip(colours).map(|(shown, colour)| shown.error(colour)).sum::<f64>();
-        let after = error(&mut painted.texels.iter().map(|&texel| painted.colour(texel)));
-        if after >= error(&mut before.into_iter()) {
+        let after = error(&shown, painted.texels.iter().map(|&texel| painted.colour(texel)));
+        if after >= error(&shown, before.into_iter()) {
             return Ok(None);
         }
         Ok(encode::with_image(bundle, &painted, settings.storage).map(|bundle| (bundle, painted)))

@@ -234,10 +234,13 @@ pub(super) fn pack(footprints: &Footprints<'_>, backdrop: [u32; 2], max_side: u3
 /// Everything once more, as much finer as there is room for in the image that `layout` takes anyhow; it has all the density that is worth its bytes. Charts
 /// that have all that can be seen, and those as wide or high as the image, stay as they are.
 pub(super) fn filled(footprints: &Footprints<'_>, backdrop: [u32; 2], max_side: u32, layout: Layout) -> Layout {
-    let packing = Packing { footprints, backdrop, max_side };
     let spares = footprints.charting.charts.iter().any(|chart| chart.finest > chart.density);
-    let scales = FREE.into_iter().filter(|_| spares && layout.scale >= 1.0);
-    scales.map(|scale| packing.finer(&layout, scale)).find_map(|finer| finer).unwrap_or(layout)
+    if !spares || layout.scale < 1.0 {
+        return layout;
+    }
+    let packing = Packing { footprints, backdrop, max_side };
+    let finer = FREE.into_iter().find_map(|scale| packing.finer(&layout, scale));
+    finer.unwrap_or(layout)
 }
 
 /// What there is to pack, and the room for it.

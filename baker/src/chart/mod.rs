@@ -239,7 +239,8 @@ pub fn build(scene: &Scene, hits: &Hits, family: Family, density: &Density, max_
     if own {
         let mut charting = islands::build(scene, hits, faces);
         // The scene's own texels are the finest there are.
-        charting.charts.iter_mut().for_each(|chart| (chart.density, chart.finest) = (density.most.min(1.0), density.most.min(1.0)));
+        let most = density.most.min(1.0);
+        charting.charts.iter_mut().for_each(|chart| (chart.density, chart.finest) = (most, most));
         return charting;
     }
     let islands = if family == Family::Own { Islands::new(scene).ok() } else { None };
