@@ -218,20 +218,17 @@ pub(crate) fn flatten_hits(
     let start = Instant::now();
     let atlas = atlas::build(scene, hits, settings, &|done, total| progress("flattening surfaces", part(done, total)))?;
     progress("looking for tears", 0.0);
+    let flat = flat(scene, (tracer, hits), atlas);
+    Ok(Flat { ray_seconds, atlas_seconds: start.elapsed().as_secs_f64(), ..flat })
+}
+
+/// What `atlas` and the rays that it was made of tell; no time is taken.
+pub(crate) fn flat(scene: &Scene, (tracer, hits): (&Tracer<'_>, &Hits), atlas: Atlas) -> Flat {
     let tears = tears::find(scene, tracer, hits, &atlas.gbuffer);
     let seams = causes::seams(scene, hits, &atlas.gbuffer);
     let planes = planes::find(scene, hits, &atlas.gbuffer, atlas.image.labels.len());
     let crossed = walls::crossed(scene, tracer);
-    Ok(Flat {
-        tears,
-        seams,
-        planes,
-        crossed,
-        rays: hits.samples.len() as u64,
-        atlas,
-        ray_seconds,
-        atlas_seconds: start.elapsed().as_secs_f64(),
-    })
+    Flat { tears, seams, planes, crossed, rays: hits.samples.len() as u64, atlas, ray_seconds: 0.0, atlas_seconds: 0.0 }
 }
 
 /// How much of `total` is done, 0..=1.

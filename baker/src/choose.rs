@@ -3,13 +3,15 @@
 
 use crate::atlas::{self, LONGER, Storage};
 use crate::bake::{self, BakeError, Flat, Progress, Settings, Sparing};
-use crate::chart::{self, Choice, Family, Trial};
+use crate::chart::{self, Charting, Choice, Family, Trial};
 use crate::gbuffer::Hits;
 use crate::job::something_seen;
 use crate::scene::Scene;
 use crate::trace::Tracer;
 use crate::truth::{Truth, spread};
 use crate::verify;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Screens narrower or lower than this are tried as they are.
 const SMALL: u32 = 160;
@@ -42,41 +44,46 @@ pub fn charts(scene: &Scene, settings: &Settings, rewarp: Option<bool>, progress
     let hits = Hits::cast(&small, &tracer, &|_, _| {});
     let truth = Truth::new(&small);
     let frames = spread(small.playback.frames, COMPARED);
-    let mut refused = None;
-    let mut choice = Choice::from(Family::Planes);
-    let last = choice.trials.len() - 1;
-    let mut tried = |family: Family, rewarped: bool| -> Option<Trial> {
+    let settings_of = |family: Family, rewarped: bool| {
         let charts = Choice { rewarped, ..family.into() };
-        let settings = Settings { atlas: atlas::Settings { charts, ..settings.atlas }, ..settings };
-        let flat = bake::flatten_hits(&small, (&tracer, &hits, 0.0), &settings.atlas, &|_, _| {});
-        match flat.and_then(|flat| attempt(&small, &flat, &settings, (&truth, &frames))) {
-            Ok((keys, picture, psnr)) => {
-                let keys = keys * f64::from(scene.playback.frames) / f64::from(small.playback.frames.max(1));
-                let scale = if small.playback.width < scene.playback.width { PICTURE } else { 1.0 };
-                Some(Trial { family, rewarped, bytes: (keys + picture / scale) as u64, psnr })
-            }
-            Err(error) => {
-                refused = refused.take().or(Some(error));
-                None
-            }
-        }
+        Settings { atlas: atlas::Settings { charts, ..settings.atlas }, ..settings }
     };
-    for (at, &family) in families.iter().enumerate() {
-        progress("trying charts", at as f64 / (families.len() + 1) as f64);
-        choice.trials[at] = tried(family, rewarp.unwrap_or(false));
+    let tried = |charting: Charting, family: Family, rewarped: bool| -> Result<Trial, BakeError> {
+        let settings = settings_of(family, rewarped);
+        let atlas = atlas::of_charts(&small, &hits, charting, &settings.atlas, &|_, _| {})?;
+        let flat = bake::flat(&small, (&tracer, &hits), atlas);
+        let (keys, picture, psnr) = attempt(&small, &flat, &settings, (&truth, &frames))?;
+        let keys = keys * f64::from(scene.playback.frames) / f64::from(small.playback.frames.max(1));
+        let scale = if small.playback.width < scene.playback.width { PICTURE } else { 1.0 };
+        Ok(Trial { family, rewarped, bytes: (keys + picture / scale) as u64, psnr })
+    };
+    let (steps, done) = (families.len() + 1, AtomicUsize::new(0));
+    progress("trying charts", 0.0);
+    // Side by side: much of each is a matter of one thread.
+    let of = |&family: &Family| {
+        let charting = atlas::charts(&small, &hits, &settings_of(family, false).atlas).map_err(BakeError::from);
+        let trial = charting.and_then(|charting| Ok((tried(charting.clone(), family, rewarp.unwrap_or(false))?, charting)));
+        progress("trying charts", (done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / steps as f64);
+        trial
+    };
+    let plain: Vec<Result<(Trial, Charting), BakeError>> = families.par_iter().map(of).collect();
+    let mut choice = Choice::from(Family::Planes);
+    for (slot, plain) in choice.trials.iter_mut().zip(&plain) {
+        *slot = plain.as_ref().ok().map(|(trial, _)| *trial);
     }
     // Of equals the first.
-    let mut best = choice.tried().copied().reduce(|best, t| if t.worth() > best.worth() { t } else { best });
-    if let (Some(plain), None) = (best, rewarp) {
-        progress("trying charts", families.len() as f64 / (families.len() + 1) as f64);
-        choice.trials[last] = tried(plain.family, true);
-        best = choice.trials[last].filter(|t| t.worth() > plain.worth() + GAIN).or(best);
+    let better = |best: (Trial, Charting), other: (Trial, Charting)| if other.0.worth() > best.0.worth() { other } else { best };
+    let mut refused = None;
+    let known = plain.into_iter().filter_map(|plain| plain.map_err(|error| refused = refused.take().or(Some(error))).ok());
+    let Some((mut best, charting)) = known.reduce(better) else { return refused.map_or(Ok(choice), Err) };
+    if rewarp.is_none() {
+        let warped = tried(charting, best.family, true).ok();
+        let [.., last] = &mut choice.trials;
+        *last = warped;
+        best = warped.filter(|warped| warped.worth() > best.worth() + GAIN).unwrap_or(best);
     }
     progress("trying charts", 1.0);
-    match (best, refused) {
-        (None, Some(error)) => Err(error),
-        (best, _) => Ok(best.map_or(choice, |best| Choice { family: best.family, rewarped: best.rewarped, ..choice })),
-    }
+    Ok(Choice { family: best.family, rewarped: best.rewarped, ..choice })
 }
 
 /// The scene at half the size and the settings for it. Cells keep theirs: half as many either way take a quarter of the time.

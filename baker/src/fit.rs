@@ -9,11 +9,14 @@ use crate::gbuffer::GBuffer;
 use crate::patch::{self, CORNERS, NODES, Patch, VALUES, Values};
 use crate::sheets::{KeyGrid, Layers, Sheets};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Conjugate gradient steps. Cells are small and overlap: 50 steps settle below 1/64 texel, half a step of what is stored.
 const STEPS: usize = 60;
 /// Products are summed in this many runs of elements, whatever the number of threads.
 const RUNS: usize = 8;
+/// Layers that a thread adds products up for at a time.
+const SUMMED: usize = 1 << 12;
 
 /// How much a layer's place on its plane counts, in pixels: it costs no bytes to be there, and where few pixels see a layer nothing else
 /// tells where it should be.
@@ -113,8 +116,9 @@ where
             }
         }
     }
+    let runs = runs(&elements);
     let product = |x: &[[f64; 2]], y: &mut [[f64; 2]]| {
-        multiply(&elements, &weights, x, y);
+        multiply(&runs, &weights, x, y);
         for ((y, x), held) in y.iter_mut().zip(x).zip(&held) {
             y[0] += held * x[0];
             y[1] += held * x[1];
@@ -268,26 +272,35 @@ impl Assembled {
     }
 }
 
+/// Elements side by side, and the layers that they have.
+struct Run<'e> {
+    elements: &'e [Element],
+    layers: Range<usize>,
+}
+
+/// The elements in runs of their order, which is that of their layers but for those that a looping path begins and ends with.
+fn runs(elements: &[Element]) -> Vec<Run<'_>> {
+    let of = |elements| {
+        let layers = |&Element { layer, .. }: &Element| layer.into_iter().flatten().filter(|&layer| layer != NOWHERE);
+        let around = |range: Range<usize>, layer: u32| range.start.min(layer as usize)..range.end.max(layer as usize + 1);
+        let layers = <[Element]>::iter(elements).flat_map(layers).fold(usize::MAX..0, around);
+        Run { elements, layers }
+    };
+    elements.chunks(elements.len().div_ceil(RUNS).max(1)).map(of).collect()
+}
+
 /// y = A x: runs of elements side by side, each in a fixed order, added up in a fixed order: the same sums on any number of threads.
-fn multiply(elements: &[Element], weights: &[Vec<Weights>], x: &[[f64; 2]], y: &mut [[f64; 2]]) {
-    let run = elements.len().div_ceil(RUNS).max(1);
-    let partial: Vec<Vec<[f64; 2]>> = elements
-        .par_chunks(run)
-        .map(|elements| {
-            let mut y = vec![[0.0; 2]; x.len()];
-            for element in elements {
-                element.multiply(&weights[element.interval as usize], x, &mut y);
-            }
-            y
-        })
-        .collect();
-    y.fill([0.0; 2]);
-    for partial in partial {
-        for (y, partial) in y.iter_mut().zip(partial) {
-            y[0] += partial[0];
-            y[1] += partial[1];
-        }
-    }
+fn multiply(runs: &[Run<'_>], weights: &[Vec<Weights>], x: &[[f64; 2]], y: &mut [[f64; 2]]) {
+    let product = |run: &Run<'_>| {
+        let mut y = vec![[0.0; 2]; x.len()];
+        run.elements.iter().for_each(|element| element.multiply(&weights[element.interval as usize], x, &mut y));
+        y
+    };
+    let products: Vec<Vec<[f64; 2]>> = runs.par_iter().map(product).collect();
+    y.par_iter_mut().with_min_len(SUMMED).enumerate().for_each(|(layer, y)| {
+        let own = runs.iter().zip(&products).filter(|(run, _)| run.layers.contains(&layer));
+        *y = own.fold([0.0; 2], |[u, v], (_, product)| [u + product[layer][0], v + product[layer][1]]);
+    });
 }
 
 fn dot(a: &[[f64; 2]], b: &[[f64; 2]]) -> [f64; 2] {

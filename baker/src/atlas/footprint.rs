@@ -15,6 +15,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 const EDGE: f64 = 1e-7;
 /// How close to a texel's edge, texels, a sample may come to lie on the other side when its chart lies elsewhere.
 const CLOSE: f64 = 1.0 / 1024.0;
+/// Faces of a chart that a thread draws at a time.
+const FACES: usize = 1 << 12;
 
 /// What footprints are made of.
 pub(super) struct Footprints<'a> {
@@ -55,17 +57,20 @@ impl<'a> Footprints<'a> {
             let (size, place) = (sizes[chart], self.place(chart, sizes[chart]));
             let fine = fine(&self.charting.charts[chart].projection, scale);
             let grid = Grid::new(self.charting, chart, place, fine);
-            let mut mask = Mask::new(size[0], size[1]);
-            for &face in faces {
-                let surface = self.charting.faces.list[face as usize].surface;
-                grid.each_sample(self.charting, face as usize, EDGE, |x, y, shares| {
-                    let (x, y) = (x / fine, y / fine);
-                    if !mask.has(x, y) && !is_hole(self.scene, surface / 2, self.charting.weights(face as usize, shares)) {
-                        mask.set(x, y);
-                    }
-                });
-            }
-            mask
+            let drawn = |faces: &[u32]| {
+                let mut mask = Mask::new(size[0], size[1]);
+                for &face in faces {
+                    let surface = self.charting.faces.list[face as usize].surface;
+                    grid.each_sample(self.charting, face as usize, EDGE, |x, y, shares| {
+                        let (x, y) = (x / fine, y / fine);
+                        if !mask.has(x, y) && !is_hole(self.scene, surface / 2, self.charting.weights(face as usize, shares)) {
+                            mask.set(x, y);
+                        }
+                    });
+                }
+                mask
+            };
+            faces.par_chunks(FACES).map(drawn).reduce_with(Mask::join).unwrap_or_else(|| Mask::new(size[0], size[1]))
         };
         self.members.par_iter().enumerate().map(of).collect()
     }

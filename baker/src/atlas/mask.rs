@@ -48,6 +48,12 @@ impl Mask {
         self.bits[word] & bit != 0
     }
 
+    /// The texels of both, which are of one size.
+    pub fn join(mut self, other: Self) -> Self {
+        self.bits.iter_mut().zip(other.bits).for_each(|(word, other)| *word |= other);
+        self
+    }
+
     /// Texels in it.
     pub fn area(&self) -> u32 {
         self.bits.iter().map(|w| w.count_ones()).sum()

@@ -207,18 +207,33 @@ pub struct Atlas {
 /// Cuts what the hits see into charts, packs and colours them. `progress` hears (steps done, steps in all).
 /// Fails if the settings are out of range or there are more charts than room.
 pub fn build(scene: &Scene, hits: &Hits, settings: &Settings, progress: &(dyn Fn(u64, u64) + Sync)) -> Result<Atlas, AtlasError> {
+    progress(0, 4);
+    of_charts(scene, hits, charts(scene, hits, settings)?, settings, progress)
+}
+
+/// Cuts what the hits see into charts, which are not halved yet, nor warped.
+/// Fails if the settings are out of range.
+pub(crate) fn charts(scene: &Scene, hits: &Hits, settings: &Settings) -> Result<Charting, AtlasError> {
     if !(64..=1024).contains(&settings.max_side) {
         return Err(AtlasError::Side(settings.max_side));
     }
-    progress(0, 4);
-    let texel = texel_bytes(settings.texels);
     let detail = settings.detail * (f64::from(hits.frames) + LONGER) / f64::from(hits.frames.max(1));
-    let density = Density { most: settings.density.clamp(0.05, 8.0), detail, texel };
-    let mut charting = chart::build(scene, hits, settings.charts.family, &density, settings.max_side);
+    let density = Density { most: settings.density.clamp(0.05, 8.0), detail, texel: texel_bytes(settings.texels) };
+    Ok(chart::build(scene, hits, settings.charts.family, &density, settings.max_side))
+}
+
+/// Packs and colours such charts: otherwise like [`build`].
+pub(crate) fn of_charts(
+    scene: &Scene,
+    hits: &Hits,
+    mut charting: Charting,
+    settings: &Settings,
+    progress: &(dyn Fn(u64, u64) + Sync),
+) -> Result<Atlas, AtlasError> {
     let backdrop = backdrop(scene, hits);
     let pack = |charting: &Charting| pack::pack(&footprint::Footprints::new(scene, hits, charting), backdrop, settings.max_side);
     let halved = match settings.storage {
-        Storage::Raw => halve::halve(scene, hits, &mut charting, texel, pack),
+        Storage::Raw => halve::halve(scene, hits, &mut charting, texel_bytes(settings.texels), pack),
         // Empty texels take next to nothing.
         Storage::Packed => 0,
     };

@@ -259,16 +259,11 @@ impl Packing<'_> {
     /// The masks at a scale. What is seen but not drawn is little, and asking all samples for it takes long.
     fn items(&self, scale: f64, seen: bool) -> Items {
         let [side, _] = self.room();
-        self.items_of(&sizes(self.footprints.charting, scale, side), scale, seen)
-    }
-
-    /// The masks of charts of `sizes`.
-    fn items_of(&self, sizes: &[[u32; 2]], scale: f64, seen: bool) -> Items {
-        let mut masks = self.footprints.drawn(sizes, scale);
+        let mut masks = self.footprints.drawn(&sizes(self.footprints.charting, scale, side), scale);
         if seen {
             self.footprints.add_seen(&mut masks);
         }
-        Items::new(scaled(self.backdrop, scale.min(1.0), self.room()[0]), &masks)
+        Items::new(scaled(self.backdrop, scale, self.room()[0]), &masks)
     }
 
     /// Everything at least `gutter` texels apart.
@@ -297,8 +292,13 @@ impl Packing<'_> {
     fn finer(&self, layout: &Layout, scale: f64) -> Option<Layout> {
         let size = [layout.width, layout.height];
         let sizes = sizes_within(self.footprints.charting, scale, size.map(|side| side - 2 * layout.rim));
-        let items = self.items_of(&sizes, scale, true);
-        let spots = items.at_all(size, [NARROW[0], layout.rim])?;
+        let mut masks = self.footprints.drawn(&sizes, scale);
+        let spots = |items: &Items| items.at_all(size, [NARROW[0], layout.rim]);
+        // What finds no room so finds none with what is seen but not drawn, which takes long to tell.
+        spots(&Items::new(self.backdrop, &masks))?;
+        self.footprints.add_seen(&mut masks);
+        let items = Items::new(self.backdrop, &masks);
+        let spots = spots(&items)?;
         Some(self.wider(&items, size, spots, scale, [NARROW[0], layout.rim]))
     }
 

@@ -88,6 +88,7 @@ pub struct Density {
 }
 
 /// All charts of a scene.
+#[derive(Clone)]
 pub struct Charting {
     /// The seen faces.
     pub(crate) faces: Faces,

@@ -9,6 +9,7 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicI64, AtomicU32, Ordering};
 
 /// A surface that at least one pixel sees.
+#[derive(Clone)]
 pub(crate) struct Face {
     /// Twice the triangle, plus one for its back.
     pub surface: u32,
@@ -35,6 +36,7 @@ impl Face {
 }
 
 /// All seen faces.
+#[derive(Clone)]
 pub(crate) struct Faces {
     /// In the order of their surfaces.
     pub list: Vec<Face>,
