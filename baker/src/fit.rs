@@ -280,13 +280,13 @@ struct Run<'e> {
 
 /// The elements in runs of their order, which is that of their layers but for those that a looping path begins and ends with.
 fn runs(elements: &[Element]) -> Vec<Run<'_>> {
-    let of = |elements| {
-        let layers = |&Element { layer, .. }: &Element| layer.into_iter().flatten().filter(|&layer| layer != NOWHERE);
-        let around = |range: Range<usize>, layer: u32| range.start.min(layer as usize)..range.end.max(layer as usize + 1);
-        let layers = <[Element]>::iter(elements).flat_map(layers).fold(usize::MAX..0, around);
-        Run { elements, layers }
+    let of = |elements: &[Element]| {
+        let layers = elements.iter().flat_map(|element| element.layer.as_flattened()).filter(|&&layer| layer != NOWHERE);
+        let (first, end) = layers.fold((usize::MAX, 0), |(first, end), &layer| (first.min(layer as usize), end.max(layer as usize + 1)));
+        first..end
     };
-    elements.chunks(elements.len().div_ceil(RUNS).max(1)).map(of).collect()
+    let run = |elements| Run { elements, layers: of(elements) };
+    elements.chunks(elements.len().div_ceil(RUNS).max(1)).map(run).collect()
 }
 
 /// y = A x: runs of elements side by side, each in a fixed order, added up in a fixed order: the same sums on any number of threads.

@@ -84,14 +84,14 @@ pub struct Drawing<'d, 'a> {
 }
 
 impl<'d, 'a> Drawing<'d, 'a> {
-    /// The row of cells that `space` holds, and the palette.
-    pub fn new(bundle: &'d Bundle<'a>, space: &'d mut Workspace<'a>) -> (Self, &'d [u16])
+    /// The row of cells that `space` holds, the palette, and what is spread of it.
+    pub fn new(bundle: &'d Bundle<'a>, space: &'d mut Workspace<'a>) -> (Self, (&'d [u16], &'d [u32]))
     where
         'a: 'd,
     {
-        let Workspace { texture, rows: [top, bottom, _], sheets, charts, plan, palette, backdrop, .. } = space;
+        let Workspace { texture, rows: [top, bottom, _], sheets, charts, plan, palette, spread, backdrop, .. } = space;
         let site = Site { bundle, texture: *texture, rows: [top, bottom], sheets, charts, backdrop: backdrop.as_ref() };
-        (Self { site, plan }, palette)
+        (Self { site, plan }, (palette, spread))
     }
 
     /// Draws pixel row `y`, which lies in the row of cells.

@@ -102,7 +102,7 @@ impl fmt::Display for Tag {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum MemoryError {
-    /// Fewer bytes than [`crate::Bundle::memory_needed`] says.
+    /// Fewer bytes than [`crate::Player::memory_needed`] says.
     TooSmall {
         /// Bytes needed.
         needed: usize,

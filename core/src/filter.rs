@@ -5,9 +5,13 @@ use crate::atlas::Texture;
 use crate::fixed::{PLAY_BITS, PlayUv};
 use crate::span::{self, Packed};
 use crate::window::{self, Line, fraction};
+use core::marker::PhantomData;
 
 /// A way of looking texels up. `colour` gives that of a texel, by its index: in the window, or in the whole picture.
 pub trait Filter: Copy {
+    /// What it mixes.
+    type Colour: Copy;
+
     /// How far it reaches beyond a position, Q16 texels.
     const REACH: i32;
     /// Its code is so short that loops over a few pixels are written out.
@@ -21,10 +25,10 @@ pub trait Filter: Copy {
     fn along<T, const WIDTH: u32, const ROWS: u32>(self, pixels: &mut [T], line: Line, make: impl Fn(Packed<WIDTH, ROWS>) -> T);
 
     /// The pixel at `at`, which has its offset, in a window of 2^ROWS rows of 2^WIDTH texels.
-    fn packed<const WIDTH: u32, const ROWS: u32>(self, at: Packed<WIDTH, ROWS>, colour: impl Fn(usize) -> u16) -> u16;
+    fn packed<const WIDTH: u32, const ROWS: u32>(self, at: Packed<WIDTH, ROWS>, colour: impl Fn(usize) -> Self::Colour) -> u16;
 
     /// The pixel at `uv`, which is inside the picture.
-    fn at(self, uv: PlayUv, x: usize, texture: &Texture<'_>, colour: impl Fn(usize) -> u16) -> u16;
+    fn at(self, uv: PlayUv, x: usize, texture: &Texture<'_>, colour: impl Fn(usize) -> Self::Colour) -> u16;
 }
 
 /// The texel that a position is in.
@@ -32,6 +36,7 @@ pub trait Filter: Copy {
 pub struct Nearest;
 
 impl Filter for Nearest {
+    type Colour = u16;
     const REACH: i32 = 0;
     const SHORT: bool = true;
 
@@ -79,6 +84,7 @@ impl Dither {
 }
 
 impl Filter for Dither {
+    type Colour = u16;
     const REACH: i32 = 3 << (PLAY_BITS - 3);
     const SHORT: bool = true;
 
@@ -107,34 +113,61 @@ impl Filter for Dither {
     }
 }
 
-/// The mean of the four texels around a position, weighted by how close their centres are, in steps of 1/32. SWAPPED: colours are in the other
-/// byte order than the machine's.
-#[derive(Clone, Copy, Debug)]
-pub struct Bilinear<const SWAPPED: bool>;
+/// A colour as means are made of it.
+pub trait Mixed: Copy {
+    /// It, as [`spread`] has it; SWAPPED: where it has two bytes, they are in the other order than the machine's.
+    fn spread<const SWAPPED: bool>(self) -> u32;
+}
+
+impl Mixed for u16 {
+    #[inline(always)]
+    fn spread<const SWAPPED: bool>(self) -> u32 {
+        spread(native::<SWAPPED>(self))
+    }
+}
+
+/// That is done already.
+impl Mixed for u32 {
+    #[inline(always)]
+    fn spread<const SWAPPED: bool>(self) -> u32 {
+        self
+    }
+}
+
+/// A colour in the machine's byte order, or back in the other.
+#[inline(always)]
+const fn native<const SWAPPED: bool>(colour: u16) -> u16 {
+    if SWAPPED { colour.swap_bytes() } else { colour }
+}
+
+/// The mean of the four texels around a position, weighted by how close their centres are, in steps of 1/32. SWAPPED: pixels, and colours of two bytes,
+/// are in the other byte order than the machine's.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Bilinear<C, const SWAPPED: bool>(PhantomData<C>);
 
 /// Fraction bits of a weight.
 const SHARE_BITS: u32 = 5;
 
-impl<const SWAPPED: bool> Bilinear<SWAPPED> {
+impl<C: Mixed, const SWAPPED: bool> Bilinear<C, SWAPPED> {
     /// The mean of `four` colours, above and below from left to right, `across` and `down` 32nds of the way between them.
     #[inline(always)]
-    fn mean(four: [u16; 4], across: u32, down: u32) -> u16 {
-        let native = |colour: u16| if SWAPPED { colour.swap_bytes() } else { colour };
+    fn mean(four: [C; 4], across: u32, down: u32) -> u16 {
         // Weights are of whole 32nds, and sum to 32.
         let last = across.wrapping_mul(down) >> SHARE_BITS;
         let (right, below) = (across.wrapping_sub(last), down.wrapping_sub(last));
         let first = (1u32 << SHARE_BITS).wrapping_sub(across).wrapping_sub(below);
-        let [a, b, c, d] = four.map(|colour| spread(native(colour)));
+        let [a, b, c, d] = four.map(C::spread::<SWAPPED>);
         let sum = a
             .wrapping_mul(first)
             .wrapping_add(b.wrapping_mul(right))
             .wrapping_add(c.wrapping_mul(below))
             .wrapping_add(d.wrapping_mul(last));
-        native(gather(sum, SHARE_BITS))
+        native::<SWAPPED>(gather(sum, SHARE_BITS))
     }
 }
 
-impl<const SWAPPED: bool> Filter for Bilinear<SWAPPED> {
+impl<C: Mixed, const SWAPPED: bool> Filter for Bilinear<C, SWAPPED> {
+    type Colour = C;
     const REACH: i32 = window::BESIDE;
     const SHORT: bool = false;
 
@@ -157,7 +190,7 @@ impl<const SWAPPED: bool> Filter for Bilinear<SWAPPED> {
     }
 
     #[inline(always)]
-    fn packed<const WIDTH: u32, const ROWS: u32>(self, at: Packed<WIDTH, ROWS>, colour: impl Fn(usize) -> u16) -> u16 {
+    fn packed<const WIDTH: u32, const ROWS: u32>(self, at: Packed<WIDTH, ROWS>, colour: impl Fn(usize) -> C) -> u16 {
         let share = |shift: u32| at.0.wrapping_shr(shift.wrapping_sub(SHARE_BITS)) & ((1 << SHARE_BITS) - 1);
         let (across, down) = (share(32u32.wrapping_sub(WIDTH)), share(fraction(WIDTH)));
         let first = at.texel();
@@ -166,7 +199,7 @@ impl<const SWAPPED: bool> Filter for Bilinear<SWAPPED> {
     }
 
     #[inline(always)]
-    fn at(self, uv: PlayUv, _: usize, texture: &Texture<'_>, colour: impl Fn(usize) -> u16) -> u16 {
+    fn at(self, uv: PlayUv, _: usize, texture: &Texture<'_>, colour: impl Fn(usize) -> C) -> u16 {
         let beside = |u: i32, v: i32| texture.clamp(PlayUv { u: uv.u.wrapping_add(u), v: uv.v.wrapping_add(v) });
         const HALF: i32 = 1 << (PLAY_BITS - 1);
         let (first, last) = (beside(-HALF, -HALF), beside(HALF, HALF));
@@ -177,7 +210,7 @@ impl<const SWAPPED: bool> Filter for Bilinear<SWAPPED> {
 }
 
 /// An RGB565 colour with red and blue apart from green, so that sums have room: bits 0..5, 11..16, and 21..27.
-const fn spread(colour: u16) -> u32 {
+pub const fn spread(colour: u16) -> u32 {
     let colour = colour as u32;
     (colour | colour << 16) & 0x07e0_f81f
 }
@@ -235,7 +268,7 @@ mod tests {
         for round in 0..4096u32 {
             let (across, down) = (round & 31, round >> 5 & 31);
             let parts: [[u16; 3]; 4] = core::array::from_fn(|_| next());
-            let played = Bilinear::<false>::mean(parts.map(colour), across, down);
+            let played = Bilinear::<u16, false>::mean(parts.map(colour), across, down);
             let weights = [(32 - across) * (32 - down), across * (32 - down), (32 - across) * down, across * down];
             let parted = [0, 1, 2].map(|part: usize| parts.map(|colour| colour.get(part).copied().unwrap_or(0)));
             for (parts, (shift, mask)) in parted.into_iter().zip([(11, 31u16), (5, 63), (0, 31)]) {
@@ -245,13 +278,13 @@ mod tests {
                 assert!(off.abs() <= 0.5 + f64::from(mask) * 2.0 / 32.0, "{parts:?} {across} {down}: {off}");
             }
             let same = colour(next());
-            assert_eq!(Bilinear::<false>::mean([same; 4], across, down), same);
-            assert_eq!(Bilinear::<true>::mean(parts.map(|part| colour(part).swap_bytes()), across, down), played.swap_bytes());
+            assert_eq!(Bilinear::<u16, false>::mean([same; 4], across, down), same);
+            assert_eq!(Bilinear::<u16, true>::mean(parts.map(|part| colour(part).swap_bytes()), across, down), played.swap_bytes());
         }
     }
 
     /// Holds the pixel at u and v, 512ths of a texel, in a window against that at the same position in a picture of the window's size.
-    fn same<F: Filter, const WIDTH: u32, const ROWS: u32>(filter: F, [u, v]: [u32; 2], x: usize) {
+    fn same<F: Filter<Colour = u16>, const WIDTH: u32, const ROWS: u32>(filter: F, [u, v]: [u32; 2], x: usize) {
         let texture = Texture { texels: &[], mask: &[], width_log2: WIDTH, height: 1 << ROWS };
         let colour = |index: usize| (index as u16).wrapping_mul(40_503);
         let [even, odd] = filter.offsets(WIDTH);
@@ -266,7 +299,7 @@ mod tests {
             for y in 0..2 {
                 same::<_, WIDTH, ROWS>(Dither::new(y), position, x);
             }
-            same::<_, WIDTH, ROWS>(Bilinear::<false>, position, x);
+            same::<_, WIDTH, ROWS>(Bilinear::<u16, false>::default(), position, x);
             same::<_, WIDTH, ROWS>(Nearest, position, x);
         }
     }

@@ -130,5 +130,5 @@ pub use error::{BundleError, MemoryError};
 pub use graphics::FrameImage;
 pub use player::Player;
 pub use playing::{ByteOrder, Frame};
-pub use texels::{AnyTexels, Direct565, Indexed4, Indexed8, Texels};
+pub use texels::{AnyTexels, Direct565, Indexed4, Indexed8, Spread8, Texels};
 pub use work::{Probe, Work};

@@ -5,6 +5,7 @@ use crate::Bundle;
 use crate::atlas::Texture;
 use crate::coder::{Decoder, Probability};
 use crate::coverage::Chart;
+use crate::filter;
 use crate::format::{self, LabelRecord, SPACE_CUBIC, TexelKind};
 use crate::key::{BACKDROP, Chain, Key};
 use crate::lists::{self, Lists};
@@ -26,6 +27,8 @@ pub struct Workspace<'m> {
     pub texture: Texture<'m>,
     /// The source image's palette in the display's byte order.
     pub palette: &'m mut [u16],
+    /// The same as means are made of it, where a player asks for it.
+    pub spread: &'m mut [u32],
     /// Every label's chart.
     pub charts: &'m mut [Chart],
     /// The keys, and what they are decoded with.
@@ -99,9 +102,9 @@ fn picture<'m>(
     Texture { texels, mask, ..texture }
 }
 
-/// Cuts a workspace, or only counts what it would take.
+/// Cuts a workspace, or only counts what it would take, with a palette of so many `spread` colours.
 #[inline(never)]
-fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, space: &mut Workspace<'m>) {
+fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, space: &mut Workspace<'m>, spread: usize) {
     let (grid, limits) = (bundle.grid(), bundle.limits());
     let (key_layers, row_layers) = (usize::from(limits.key_layers), usize::from(limits.row_layers));
     let (back, ahead) = format::reach(bundle.path().time);
@@ -157,6 +160,11 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, space: &mut Workspace<'
     // by pixel.
     let sides = usize::from(limits.row_sheets);
     plan.side = cutter.take::<Side>(if cubic { sides } else { sides.wrapping_shr(grid.log2.saturating_sub(BLOCK_LOG2)) });
+    space.spread = cutter.take(spread);
+    // A palette of two bytes a colour, in the machine's order so far.
+    for (spread, &colour) in space.spread.iter_mut().zip(&*space.palette) {
+        *spread = filter::spread(colour);
+    }
 }
 
 impl Bundle<'_> {
@@ -166,7 +174,7 @@ impl Bundle<'_> {
     pub fn memory_needed(&self) -> usize {
         let mut counter = Cutter::new(&mut []);
         picture(self, &mut counter, |_, _, _| {});
-        cut(self, &mut counter, &mut Workspace::default());
+        cut(self, &mut counter, &mut Workspace::default(), 0);
         counter.needed().saturating_mul(4).saturating_add(3)
     }
 }
@@ -182,17 +190,19 @@ pub fn colours(palette: &mut [u16], bundle: &Bundle<'_>, swapped: bool) {
     }
 }
 
-/// Cuts `memory` up for `bundle`, whose source image `unpack` unpacks if it is packed, into slices of nothing where it is too small.
+/// Cuts `memory` up for `bundle`, whose source image `unpack` unpacks if it is packed, into slices of nothing where it is too small; with a palette of so
+/// many `spread` colours.
 // In place: returned, it would be on the stack twice.
 #[inline(never)]
 pub fn cut_up<'m>(
     bundle: &Bundle<'m>,
     memory: &'m mut [u8],
     space: &mut Workspace<'m>,
+    spread: usize,
     unpack: impl Fn(&mut Decoder<'_>, Scratch<'_>, &mut Picture<'_>),
 ) {
     let (_, words, _) = bytemuck::pod_align_to_mut::<u8, u32>(memory);
     let mut cutter = Cutter::new(words);
     space.texture = picture(bundle, &mut cutter, unpack);
-    cut(bundle, &mut cutter, space);
+    cut(bundle, &mut cutter, space, spread);
 }

@@ -105,6 +105,8 @@ pub struct Look<'t> {
     pub texture: Texture<'t>,
     /// Its palette in the display's byte order, as many entries as the kind can have.
     pub palette: &'t [u16],
+    /// The same as means are made of it, where that was asked for.
+    pub spread: &'t [u32],
     /// Pixels' bytes are in the other order than the machine's.
     pub swapped: bool,
 }
@@ -127,11 +129,12 @@ impl<'a> Playing<'a> {
         }
     }
 
-    /// Plays over `memory`, at least [`Bundle::memory_needed`] bytes; `unpack` unpacks a packed source image.
+    /// Plays over `memory`, at least [`Bundle::memory_needed`] bytes, and what a palette of so many `spread` colours takes; `unpack` unpacks a packed
+    /// source image.
     #[inline(never)]
-    pub fn give(&mut self, memory: &'a mut [u8], unpack: impl Fn(&mut Decoder<'_>, Scratch<'_>, &mut Picture<'_>)) {
+    pub fn give(&mut self, memory: &'a mut [u8], spread: usize, unpack: impl Fn(&mut Decoder<'_>, Scratch<'_>, &mut Picture<'_>)) {
         self.moment = self.bundle.moment(0);
-        memory::cut_up(self.bundle, memory, &mut self.space, unpack);
+        memory::cut_up(self.bundle, memory, &mut self.space, spread, unpack);
     }
 
     /// The bundle that plays.
@@ -237,8 +240,8 @@ impl<'a> Playing<'a> {
             return None;
         }
         let (kind, texture, swapped) = (self.bundle.texel_kind(), self.space.texture, self.swapped);
-        let (drawing, palette) = Drawing::new(self.bundle, &mut self.space);
-        Some((drawing, &mut self.work, Look { kind, texture, palette, swapped }))
+        let (drawing, (palette, spread)) = Drawing::new(self.bundle, &mut self.space);
+        Some((drawing, &mut self.work, Look { kind, texture, palette, spread, swapped }))
     }
 
     /// Says where each pixel of row `y` comes from.

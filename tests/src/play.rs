@@ -22,7 +22,7 @@ pub fn visit_as<T: Texels>(
     mut visit: impl FnMut(u32, &mut Player<'_, T>),
 ) -> Result<()> {
     let bundle = Bundle::parse(bytes)?;
-    let mut memory = vec![0; bundle.memory_needed()];
+    let mut memory = vec![0; Player::<T>::memory_needed(&bundle)];
     let mut player = Player::<T>::with_texels(&bundle, &mut memory)?;
     for frame in frames {
         player.seek(Frame(frame));
@@ -75,7 +75,7 @@ type Way<'a, T> = fn(&mut Player<'a, T>, u32, &mut [u16]);
 pub fn every_way<T: Texels>(bytes: &[u8], frames: &[u32], fill: u8, order: ByteOrder) -> Result<Vec<u16>> {
     let bundle = Bundle::parse(bytes)?;
     let (width, height) = bundle.size();
-    let mut memory = vec![fill; bundle.memory_needed()];
+    let mut memory = vec![fill; Player::<T>::memory_needed(&bundle)];
     let mut player = Player::<T>::with_texels(&bundle, &mut memory)?;
     player.set_byte_order(order);
     let mut out = Vec::new();

@@ -7,7 +7,7 @@ use cubist_baker::bake::{Flat, Settings};
 use cubist_baker::inspect::Inspection;
 use cubist_baker::{Options, TruthFrames, bake_scene, encode};
 use cubist_core::format::{ATLAS, Atlas, MASK, TexelKind};
-use cubist_core::{AnyTexels, Bundle, ByteOrder, Direct565, Indexed4, Indexed8, MemoryError, Player, Texels};
+use cubist_core::{AnyTexels, Bundle, ByteOrder, Direct565, Indexed4, Indexed8, MemoryError, Player, Spread8, Texels};
 use cubist_tests::{play, scenes, tamper};
 
 const SIZE: [u32; 2] = [104, 78];
@@ -86,6 +86,7 @@ fn same(name: &str, four: &[u8]) {
             ByteOrder::LittleEndian => native.iter().map(|pixel| pixel.to_le()).collect(),
         };
         assert!(pixels::<Indexed8>(&eight, 0, order) == wanted, "{name}, {order:?}");
+        assert!(pixels::<Spread8>(&eight, 0x5a, order) == wanted, "{name}, {order:?}: 8 bits, the palette spread");
         assert!(pixels::<Indexed4>(four, 0, order) == wanted, "{name}, {order:?}: 4 bits");
         assert!(pixels::<Direct565>(&direct, 0, order) == wanted, "{name}, {order:?}: RGB565");
         for bytes in [&eight[..], four, &direct] {
@@ -126,10 +127,23 @@ fn texels_take_what_their_kind_says() {
 }
 
 #[test]
+fn a_spread_palette_takes_a_kilobyte_that_has_to_be_there() {
+    let (_, [raw, packed]) = baked(SCENES[2], TexelKind::Indexed8);
+    for bytes in [raw, packed] {
+        let bundle = Bundle::parse(&bytes).expect("sound");
+        let needed = bundle.memory_needed() + 1024;
+        assert_eq!([Player::<Spread8>::memory_needed(&bundle), Player::<Indexed8>::memory_needed(&bundle)], [needed, needed - 1024]);
+        let refused = Player::<Spread8>::with_texels(&bundle, &mut vec![0; needed - 1]).err();
+        assert_eq!(refused, Some(MemoryError::TooSmall { needed, given: needed - 1 }));
+        assert!(pixels::<Spread8>(&bytes, 0xa5, ByteOrder::Native) == pixels::<Indexed8>(&bytes, 0, ByteOrder::Native));
+    }
+}
+
+#[test]
 fn a_player_of_other_texels_says_what_the_bundle_needs() {
     fn refusal<T: Texels>(bytes: &[u8]) -> Option<MemoryError> {
         let bundle = Bundle::parse(bytes).expect("sound");
-        Player::<T>::with_texels(&bundle, &mut vec![0; bundle.memory_needed()]).err()
+        Player::<T>::with_texels(&bundle, &mut vec![0; Player::<T>::memory_needed(&bundle)]).err()
     }
     let (_, [four, packed]) = baked(SCENES[2], TexelKind::Indexed4);
     let [eight, direct] = retold(&four);
@@ -138,6 +152,7 @@ fn a_player_of_other_texels_says_what_the_bundle_needs() {
     {
         let error = |plays: TexelKind| (plays != needed).then_some(MemoryError::Texels { needed });
         assert_eq!(refusal::<Indexed8>(bytes), error(TexelKind::Indexed8));
+        assert_eq!(refusal::<Spread8>(bytes), error(TexelKind::Indexed8));
         assert_eq!(refusal::<Indexed4>(bytes), error(TexelKind::Indexed4));
         assert_eq!(refusal::<Direct565>(bytes), error(TexelKind::Direct565));
         assert_eq!(refusal::<AnyTexels>(bytes), None);

@@ -15,10 +15,10 @@ pub type Row = for<'p, 'a, 'r> fn(&'p mut Player<'a, AnyTexels>, u32, &'r mut [u
 pub fn way(kind: &str) -> Result<Row> {
     Ok(match kind {
         "dithered" => |player, y, out| player.dithered_row(y, out),
-        "bilinear" => |player, y, out| player.bilinear_row(y, out),
+        "bilinear" | "bilinear-spread" => |player, y, out| player.bilinear_row(y, out),
         "smooth" => |player, y, out| player.smooth_row(y, out),
-        "fine" => |player, y, out| player.fine_row(y, out),
-        _ => bail!("{kind}: no kind of rows; dithered, bilinear, smooth and fine are"),
+        "fine" | "fine-spread" => |player, y, out| player.fine_row(y, out),
+        _ => bail!("{kind}: no kind of rows; dithered, bilinear, smooth and fine are, and bilinear-spread and fine-spread"),
     })
 }
 

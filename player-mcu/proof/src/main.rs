@@ -13,7 +13,7 @@ mod sum;
 use core::fmt::Write;
 use core::hint::black_box;
 use cortex_m_rt::entry;
-use cubist_core::{Bundle, BundleError, ByteOrder, Frame, MemoryError, Player, Probe};
+use cubist_core::{Bundle, BundleError, ByteOrder, Frame, MemoryError, Player, Probe, Texels};
 use embedded_graphics_core::geometry::{Point, Size};
 use embedded_graphics_core::image::ImageDrawable;
 use embedded_graphics_core::primitives::Rectangle;
@@ -30,13 +30,10 @@ enum Trouble {
     Memory(MemoryError),
 }
 
-/// Plays `bytes` in every way there is.
-fn play(bytes: &[u8], memory: &mut [u8], row: &mut [u16], probes: &mut [Probe]) -> Result<u32, Trouble> {
+/// Plays `bytes` in every way there is, as texels of the kinds of `T`.
+fn play<T: Texels>(bytes: &[u8], memory: &mut [u8], row: &mut [u16], probes: &mut [Probe]) -> Result<u32, Trouble> {
     let bundle = Bundle::parse(bytes).map_err(Trouble::Bundle)?;
-    #[cfg(not(feature = "rows"))]
-    let mut player = Player::new(&bundle, memory).map_err(Trouble::Memory)?;
-    #[cfg(feature = "rows")]
-    let mut player = Player::<cubist_core::AnyTexels>::with_texels(&bundle, memory).map_err(Trouble::Memory)?;
+    let mut player = Player::<T>::with_texels(&bundle, memory).map_err(Trouble::Memory)?;
     player.set_byte_order(black_box(ByteOrder::BigEndian));
     let mut sum = Sum(0);
     for frame in 0..black_box(3) {
@@ -60,6 +57,21 @@ fn play(bytes: &[u8], memory: &mut [u8], row: &mut [u16], probes: &mut [Probe]) 
     Ok(sum.0)
 }
 
+#[cfg(not(feature = "rows"))]
+use play as played;
+
+/// Likewise, and with the palette spread.
+#[cfg(feature = "rows")]
+fn played<T: Texels>(bytes: &[u8], memory: &mut [u8], row: &mut [u16], probes: &mut [Probe]) -> Result<u32, Trouble> {
+    play::<cubist_core::Spread8>(bytes, memory, row, probes)?;
+    play::<T>(bytes, memory, row, probes)
+}
+
+#[cfg(not(feature = "rows"))]
+type Kinds = cubist_core::Indexed8;
+#[cfg(feature = "rows")]
+type Kinds = cubist_core::AnyTexels;
+
 /// What the proofs must catch, one feature each.
 fn seeded(bytes: &[u8]) -> u32 {
     #[cfg(feature = "panics")]
@@ -80,7 +92,7 @@ fn main() -> ! {
     loop {
         let bytes = black_box(&BYTES[..]);
         let mut text = Sum(0);
-        let written = match play(bytes, black_box(MEMORY), black_box(ROW), black_box(&mut probes)) {
+        let written = match played::<Kinds>(bytes, black_box(MEMORY), black_box(ROW), black_box(&mut probes)) {
             Ok(sum) => write!(text, "{sum}"),
             Err(Trouble::Bundle(error)) => write!(text, "{error}"),
             Err(Trouble::Memory(error)) => write!(text, "{error}"),

@@ -18,6 +18,12 @@ use cortex_m_semihosting::debug::{self, EXIT_FAILURE};
 use cubist_core::{Bundle, Frame, Player, Work};
 use text::Line;
 
+/// What the firmware plays.
+#[cfg(not(feature = "spread"))]
+type Texels = cubist_core::Indexed8;
+#[cfg(feature = "spread")]
+type Texels = cubist_core::Spread8;
+
 /// Room for a player's working memory; what is not asked for stays untouched.
 const ROOM: usize = 1 << 20;
 /// The widest screen there is.
@@ -29,7 +35,7 @@ struct Aligned<T: ?Sized>(T);
 static BUNDLE: &Aligned<[u8]> = &Aligned(*include_bytes!(concat!(env!("OUT_DIR"), "/bundle.cubist")));
 
 /// Draws row `y` as the firmware's feature says.
-fn draw(player: &mut Player<'_>, y: u32, row: &mut [u16]) {
+fn draw(player: &mut Player<'_, Texels>, y: u32, row: &mut [u16]) {
     #[cfg(feature = "dithered")]
     player.dithered_row(y, row);
     #[cfg(feature = "bilinear")]
@@ -85,7 +91,7 @@ struct Rows {
 }
 
 #[inline(never)]
-fn rows(player: &mut Player<'_>, row: &mut [u16], clock: &mut Clock) -> Rows {
+fn rows(player: &mut Player<'_, Texels>, row: &mut [u16], clock: &mut Clock) -> Rows {
     let (height, cell) = (player.bundle().size().1, 1u32 << player.bundle().path().cell_log2);
     let mut found = Rows { checksum: 0x811c_9dc5, loading: 0, fit: Fit::default() };
     // There is something to work out for each row of blocks: cells, or parts of larger ones.
@@ -124,16 +130,16 @@ fn parse(place: &'static mut Option<Bundle<'static>>) -> &'static Bundle<'static
 /// Makes a player in its place.
 #[inline(never)]
 fn make(
-    place: &'static mut Option<Player<'static>>,
+    place: &'static mut Option<Player<'static, Texels>>,
     bundle: &'static Bundle<'static>,
     memory: &'static mut [u8],
-) -> &'static mut Player<'static> {
+) -> &'static mut Player<'static, Texels> {
     let Ok(player) = Player::put(place, bundle, memory) else { fail("too little memory") };
     player
 }
 
 #[inline(never)]
-fn play(player: &mut Player<'_>, row: &mut [u16], clock: &mut Clock) {
+fn play(player: &mut Player<'_, Texels>, row: &mut [u16], clock: &mut Clock) {
     let bundle = player.bundle();
     let (width, height) = bundle.size();
     let Some(row) = row.get_mut(..width as usize) else { fail("a wide screen") };
@@ -191,7 +197,7 @@ fn report(frame: u32, [seek, drawing, loading]: [u32; 3], work: &Work, fit: &Fit
 #[inline(never)]
 fn end(memory: usize) {
     let mut line = Line::new();
-    line.word("{\"memory_bytes\": ").number(memory as u64).word(", \"player_bytes\": ").number(size_of::<Player<'_>>() as u64);
+    line.word("{\"memory_bytes\": ").number(memory as u64).word(", \"player_bytes\": ").number(size_of::<Player<'_, Texels>>() as u64);
     line.word("}").end();
 }
 
@@ -200,11 +206,11 @@ fn main() -> ! {
     static mut MEMORY: [u8; ROOM] = [0; ROOM];
     static mut ROW: [u16; WIDEST] = [0; WIDEST];
     static mut PARSED: Option<Bundle<'static>> = None;
-    static mut PLAYER: Option<Player<'static>> = None;
+    static mut PLAYER: Option<Player<'static, Texels>> = None;
     let Some(peripherals) = Peripherals::take() else { fail("no peripherals") };
     let mut clock = Clock::start(peripherals.SYST);
     let bundle = parse(PARSED);
-    let needed = bundle.memory_needed();
+    let needed = Player::<Texels>::memory_needed(bundle);
     let Some(memory) = MEMORY.get_mut(..needed) else { fail("too little memory") };
     play(make(PLAYER, bundle, memory), ROW, &mut clock);
     end(needed);

@@ -18,7 +18,9 @@ type Texels = cubist_core::AnyTexels;
 type Texels = cubist_core::Indexed4;
 #[cfg(feature = "direct")]
 type Texels = cubist_core::Direct565;
-#[cfg(not(any(feature = "any", feature = "four", feature = "direct")))]
+#[cfg(feature = "spread")]
+type Texels = cubist_core::Spread8;
+#[cfg(not(any(feature = "any", feature = "four", feature = "direct", feature = "spread")))]
 type Texels = cubist_core::Indexed8;
 
 /// What a bundle is to the compiler: bytes that it knows nothing about.
