@@ -7,7 +7,7 @@
 
 use crate::coder::{Bits, Probability};
 use crate::field;
-use crate::format::{LabelRecord, MAX_NODE_LAYERS};
+use crate::format::{LabelRecord, MAX_NODE_LAYERS, MAX_SHEETS};
 use crate::key::{BACKDROP, Chain, Key, NONE, Setting, Source};
 use crate::lists::{CHART, Cursor, Lists, SheetsRef};
 use crate::predict;
@@ -188,14 +188,12 @@ impl Finding<'_> {
                 column = column.wrapping_add(usize::from(alike));
                 continue;
             }
-            let mut labels: Vec<Found, MAX_NODE_LAYERS> = Vec::new();
-            around.labels(column < grid.columns, &mut labels);
             let mut next: Vec<u16, MAX_NODE_LAYERS> = Vec::new();
-            for &found in &labels {
+            around.labels(column < grid.columns, |found| {
                 if let Some(chain) = self.put(&open, found, column as u16, 1) {
                     let _ = next.push(chain);
                 }
-            }
+            });
             open = next;
             column = column.wrapping_add(1);
         }
@@ -233,32 +231,54 @@ struct Found {
     tested: bool,
 }
 
+/// The labels of the four cells on one side of a node, ascending.
+type Side = Vec<Found, { 4 * MAX_SHEETS }>;
+
 /// The cells around a node as a row of nodes is walked: above and below, in the interval before and after.
 struct Corner<'l, 'm> {
     /// The cells to the left of the node, and those to the right with their lists.
     left: [SheetsRef<'l>; 4],
     right: [Option<(&'l Lists<'m>, Cursor)>; 4],
+    /// What those to the left show.
+    seen: Side,
 }
 
 impl<'l, 'm> Corner<'l, 'm> {
     fn new([before, after]: [Option<&'l Lists<'m>>; 2], row: usize) -> Self {
         let at = |list: Option<&'l Lists<'m>>, row: Option<usize>| list.zip(row).map(|(list, row)| (list, list.row(row)));
         let above = row.checked_sub(1);
-        Self { left: [SheetsRef::default(); 4], right: [at(before, above), at(before, Some(row)), at(after, above), at(after, Some(row))] }
+        let right = [at(before, above), at(before, Some(row)), at(after, above), at(after, Some(row))];
+        Self { left: [SheetsRef::default(); 4], right, seen: Side::new() }
     }
 
-    /// Collects the labels of the cells around the node, ascending; then moves on.
-    fn labels(&mut self, inside: bool, found: &mut Vec<Found, MAX_NODE_LAYERS>) {
+    /// Passes the labels of the cells around the node on, ascending, as many as a node may have; then moves on.
+    fn labels(&mut self, inside: bool, mut pass: impl FnMut(Found)) {
+        let mut ahead = Side::new();
         for (left, right) in self.left.iter_mut().zip(&mut self.right) {
             let mut sheets = SheetsRef::default();
             if let Some((list, cursor)) = right.as_mut().filter(|_| inside) {
                 sheets = list.sheets(*cursor);
                 *cursor = cursor.next(list);
             }
-            collect(*left, found);
-            collect(sheets, found);
+            collect(sheets, &mut ahead);
             *left = sheets;
         }
+        let (mut left, mut right) = (self.seen.iter().copied().peekable(), ahead.iter().copied().peekable());
+        for _ in 0..MAX_NODE_LAYERS {
+            let found = match (left.peek(), right.peek()) {
+                (Some(a), Some(b)) if a.label == b.label => {
+                    let tested = a.tested | b.tested;
+                    right.next();
+                    left.next().map(|found| Found { tested, ..found })
+                }
+                (Some(a), Some(b)) if a.label > b.label => right.next(),
+                (Some(_), _) => left.next(),
+                (None, _) => right.next(),
+            };
+            let Some(found) = found else { break };
+            pass(found);
+        }
+        self.seen = ahead;
     }
 
     /// The one label that all cells around each of the next nodes show, and how many nodes these are, `most` at most; moves past them. `None` where the
@@ -291,7 +311,7 @@ impl<'l, 'm> Corner<'l, 'm> {
 }
 
 /// Adds what a cell's `sheets` say about its nodes.
-fn collect(sheets: SheetsRef<'_>, found: &mut Vec<Found, MAX_NODE_LAYERS>) {
+fn collect(sheets: SheetsRef<'_>, found: &mut Side) {
     for (index, &label) in sheets.labels.iter().enumerate() {
         let tested = sheets.test(index) != CHART;
         // A few at most: a walk finds the place as fast as any search.
@@ -299,7 +319,7 @@ fn collect(sheets: SheetsRef<'_>, found: &mut Vec<Found, MAX_NODE_LAYERS>) {
         let full = found.is_full();
         match found.get_mut(at) {
             Some(other) if other.label == label => other.tested |= tested,
-            // Labels past the bound of a node are left out; its cells do without them.
+            // There is room for all that four cells can have.
             _ if full => {}
             _ => {
                 // Each makes room for the one before it.
