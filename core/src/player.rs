@@ -156,7 +156,7 @@ impl<'a, T: Texels> Player<'a, T> {
     }
 
     /// Like [`Player::row`], every pixel a mean of the four texels around its position, weighted by how close they are. Four texel reads a pixel
-    /// instead of one, and for a player of [`crate::Spread8`] a fifth fewer instructions than else.
+    /// instead of one, and for a player of [`crate::Spread8`] a seventh fewer instructions than for others.
     #[inline]
     pub fn bilinear_row(&mut self, y: u32, out: &mut [u16]) {
         T::bilinear_row(&mut self.playing, y, out);

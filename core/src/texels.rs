@@ -63,6 +63,10 @@ trait Kind {
     type Colour: Copy;
     /// What makes colours of positions.
     type Colours<'t>: Colours<Colour = Self::Colour>;
+    /// Draws the rows that are made of no means.
+    type Plain: Kind<Colour = u16>;
+    /// Colours that are held spread as well.
+    const SPREAD: usize = 0;
 
     /// Whether texels of `kind` are played.
     fn plays(kind: TexelKind) -> bool;
@@ -73,6 +77,9 @@ trait Kind {
     /// Unpacks texels of `kind`.
     fn unpack(kind: TexelKind, bits: &mut Decoder<'_>, scratch: Scratch<'_>, picture: &mut Picture<'_>);
 }
+
+/// The kind that draws what is made of no means.
+type Plain<K> = <K as Kind>::Plain;
 
 /// Draws row `y`.
 #[inline(always)]
@@ -96,7 +103,7 @@ fn smooth<K: Kind, F: Filter<Colour = K::Colour>>(playing: &mut Playing<'_>, y: 
 macro_rules! sources {
     ($($kind:ty)*) => {$(
         impl Source for $kind {
-            const SPREAD: usize = 0;
+            const SPREAD: usize = <$kind as Kind>::SPREAD;
 
             fn known(kind: TexelKind) -> bool {
                 <$kind>::plays(kind)
@@ -104,19 +111,19 @@ macro_rules! sources {
 
             fn give<'a>(playing: &mut Playing<'a>, memory: &'a mut [u8]) {
                 let kind = playing.bundle().texel_kind();
-                playing.give(memory, 0, |bits, scratch, picture| <$kind>::unpack(kind, bits, scratch, picture));
+                playing.give(memory, <$kind as Kind>::SPREAD, |bits, scratch, picture| <$kind>::unpack(kind, bits, scratch, picture));
             }
 
             fn row(playing: &mut Playing<'_>, y: u32, out: &mut [u16]) {
-                row::<Self, _>(playing, y, out, Nearest);
+                row::<Plain<$kind>, _>(playing, y, out, Nearest);
             }
 
             fn smooth_row(playing: &mut Playing<'_>, y: u32, out: &mut [u16]) {
-                smooth::<Self, _>(playing, y, out, Nearest);
+                smooth::<Plain<$kind>, _>(playing, y, out, Nearest);
             }
 
             fn dithered_row(playing: &mut Playing<'_>, y: u32, out: &mut [u16]) {
-                row::<Self, _>(playing, y, out, Dither::new(y));
+                row::<Plain<$kind>, _>(playing, y, out, Dither::new(y));
             }
 
             fn bilinear_row(playing: &mut Playing<'_>, y: u32, out: &mut [u16]) {
@@ -138,48 +145,7 @@ macro_rules! sources {
     )*};
 }
 
-sources!(Indexed8 Indexed4 Direct565 AnyTexels);
-
-// Means are made of spread colours, all else of the others.
-impl Source for Spread8 {
-    const SPREAD: usize = 256;
-
-    fn known(kind: TexelKind) -> bool {
-        Indexed8::plays(kind)
-    }
-
-    fn give<'a>(playing: &mut Playing<'a>, memory: &'a mut [u8]) {
-        playing.give(memory, Self::SPREAD, |bits, scratch, picture| Indexed8::unpack(TexelKind::Indexed8, bits, scratch, picture));
-    }
-
-    fn row(playing: &mut Playing<'_>, y: u32, out: &mut [u16]) {
-        row::<Indexed8, _>(playing, y, out, Nearest);
-    }
-
-    fn smooth_row(playing: &mut Playing<'_>, y: u32, out: &mut [u16]) {
-        smooth::<Indexed8, _>(playing, y, out, Nearest);
-    }
-
-    fn dithered_row(playing: &mut Playing<'_>, y: u32, out: &mut [u16]) {
-        row::<Indexed8, _>(playing, y, out, Dither::new(y));
-    }
-
-    fn bilinear_row(playing: &mut Playing<'_>, y: u32, out: &mut [u16]) {
-        if playing.swapped() {
-            row::<Self, _>(playing, y, out, Bilinear::<_, true>::default());
-        } else {
-            row::<Self, _>(playing, y, out, Bilinear::<_, false>::default());
-        }
-    }
-
-    fn fine_row(playing: &mut Playing<'_>, y: u32, out: &mut [u16]) {
-        if playing.swapped() {
-            smooth::<Self, _>(playing, y, out, Bilinear::<_, true>::default());
-        } else {
-            smooth::<Self, _>(playing, y, out, Bilinear::<_, false>::default());
-        }
-    }
-}
+sources!(Indexed8 Spread8 Indexed4 Direct565 AnyTexels);
 
 /// Bundles of [`TexelKind::Indexed8`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
@@ -330,6 +296,8 @@ fn paint<C: Colours, F: Filter<Colour = C::Colour>, W: Copy, const WIDTH: u32, c
 impl Kind for Spread8 {
     type Colour = u32;
     type Colours<'t> = Colours8<'t, u32>;
+    type Plain = Indexed8;
+    const SPREAD: usize = 256;
 
     fn plays(kind: TexelKind) -> bool {
         Indexed8::plays(kind)
@@ -348,6 +316,7 @@ impl Kind for Spread8 {
 impl Kind for Indexed8 {
     type Colour = u16;
     type Colours<'t> = Colours8<'t>;
+    type Plain = Self;
 
     fn plays(kind: TexelKind) -> bool {
         kind == TexelKind::Indexed8
@@ -425,6 +394,7 @@ impl Colours for Colours4<'_> {
 impl Kind for Indexed4 {
     type Colour = u16;
     type Colours<'t> = Colours4<'t>;
+    type Plain = Self;
 
     fn plays(kind: TexelKind) -> bool {
         kind == TexelKind::Indexed4
@@ -493,6 +463,7 @@ impl Colours for ColoursDirect<'_> {
 impl Kind for Direct565 {
     type Colour = u16;
     type Colours<'t> = ColoursDirect<'t>;
+    type Plain = Self;
 
     fn plays(kind: TexelKind) -> bool {
         kind == TexelKind::Direct565
@@ -557,6 +528,7 @@ impl Colours for AnyColours<'_> {
 impl Kind for AnyTexels {
     type Colour = u16;
     type Colours<'t> = AnyColours<'t>;
+    type Plain = Self;
 
     fn plays(_: TexelKind) -> bool {
         true
