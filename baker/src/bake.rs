@@ -2,15 +2,15 @@
 //! The stages are the crate's modules; this runs them in order, times them, and reports progress.
 
 use crate::atlas::{self, Atlas, AtlasError, SourceImage};
+use crate::cast::Cast;
 use crate::causes::{self, Causes};
 use crate::chart;
 use crate::encode::{self, CodingSettings, Content};
 use crate::folds::{self, Folded};
-use crate::gbuffer::{Hits, Lens};
+use crate::gbuffer::Lens;
 use crate::planes::{self, FlatChart};
 use crate::scene::Scene;
 use crate::sheets::{self, KeyGrid, Layers};
-use crate::trace::Tracer;
 use crate::verify::VerifyError;
 use crate::walls;
 use crate::{cuts, fields, fit, order, polish, prune, spare, tears, timing};
@@ -197,34 +197,25 @@ pub struct Encoded {
 /// # Errors
 /// [`BakeError`] where the settings are out of range or the charts do not fit.
 pub fn flatten(scene: &Scene, settings: &atlas::Settings, progress: Progress<'_>) -> Result<Flat, BakeError> {
-    let start = Instant::now();
-    progress("building the hierarchy", 0.0);
-    let tracer = Tracer::new(scene);
-    let hits = Hits::cast(scene, &tracer, &|done, total| progress("casting rays", part(done, total)));
-    let ray_seconds = start.elapsed().as_secs_f64();
-    flatten_hits(scene, (&tracer, &hits, ray_seconds), settings, progress)
+    flatten_cast(&Cast::new(scene, progress), settings, progress)
 }
 
-/// Makes the source image of rays that are cast, in so many seconds.
+/// Makes the source image of rays that are cast.
 ///
 /// # Errors
 /// Those of [`flatten`].
-pub(crate) fn flatten_hits(
-    scene: &Scene,
-    (tracer, hits, ray_seconds): (&Tracer<'_>, &Hits, f64),
-    settings: &atlas::Settings,
-    progress: Progress<'_>,
-) -> Result<Flat, BakeError> {
+pub fn flatten_cast(cast: &Cast<'_>, settings: &atlas::Settings, progress: Progress<'_>) -> Result<Flat, BakeError> {
     let start = Instant::now();
-    let atlas = atlas::build(scene, hits, settings, &|done, total| progress("flattening surfaces", part(done, total)))?;
+    let atlas = atlas::build(cast.scene, &cast.hits, settings, &|done, total| progress("flattening surfaces", part(done, total)))?;
     progress("looking for tears", 0.0);
-    let flat = flat(scene, (tracer, hits), atlas);
-    Ok(Flat { ray_seconds, atlas_seconds: start.elapsed().as_secs_f64(), ..flat })
+    let flat = flat(cast, atlas);
+    Ok(Flat { ray_seconds: cast.seconds, atlas_seconds: start.elapsed().as_secs_f64(), ..flat })
 }
 
 /// What `atlas` and the rays that it was made of tell; no time is taken.
-pub(crate) fn flat(scene: &Scene, (tracer, hits): (&Tracer<'_>, &Hits), atlas: Atlas) -> Flat {
-    let tears = tears::find(scene, tracer, hits, &atlas.gbuffer);
+pub(crate) fn flat(cast: &Cast<'_>, atlas: Atlas) -> Flat {
+    let Cast { scene, tracer, hits, .. } = cast;
+    let tears = tears::find(cast, &atlas.gbuffer);
     let seams = causes::seams(scene, hits, &atlas.gbuffer);
     let planes = planes::find(scene, hits, &atlas.gbuffer, atlas.image.labels.len());
     let crossed = walls::crossed(scene, tracer);

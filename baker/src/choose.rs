@@ -3,11 +3,10 @@
 
 use crate::atlas::{self, LONGER, Storage};
 use crate::bake::{self, BakeError, Flat, Progress, Settings, Sparing};
+use crate::cast::Cast;
 use crate::chart::{self, Charting, Choice, Family, Trial};
-use crate::gbuffer::Hits;
 use crate::job::something_seen;
 use crate::scene::Scene;
-use crate::trace::Tracer;
 use crate::truth::{Truth, spread};
 use crate::verify;
 use rayon::prelude::*;
@@ -40,19 +39,19 @@ pub fn charts(scene: &Scene, settings: &Settings, rewarp: Option<bool>, progress
         &[Family::Planes, Family::Sight]
     };
     let (small, settings) = halved(scene, settings);
-    let tracer = Tracer::new(&small);
-    let hits = Hits::cast(&small, &tracer, &|_, _| {});
+    let cast = Cast::new(&small, &|_, _| {});
+    let hits = &cast.hits;
     let truth = Truth::new(&small);
-    let frames = spread(small.playback.frames, COMPARED);
+    let pictures: Vec<(u32, Vec<u8>)> = spread(small.playback.frames, COMPARED).into_iter().map(|f| (f, truth.frame(f))).collect();
     let settings_of = |family: Family, rewarped: bool| {
         let charts = Choice { rewarped, ..family.into() };
         Settings { atlas: atlas::Settings { charts, ..settings.atlas }, ..settings }
     };
     let tried = |charting: Charting, family: Family, rewarped: bool| -> Result<Trial, BakeError> {
         let settings = settings_of(family, rewarped);
-        let atlas = atlas::of_charts(&small, &hits, charting, &settings.atlas, &|_, _| {})?;
-        let flat = bake::flat(&small, (&tracer, &hits), atlas);
-        let (keys, picture, psnr) = attempt(&small, &flat, &settings, (&truth, &frames))?;
+        let atlas = atlas::of_charts(&small, hits, charting, &settings.atlas, &|_, _| {})?;
+        let flat = bake::flat(&cast, atlas);
+        let (keys, picture, psnr) = attempt(&small, &flat, &settings, &pictures)?;
         let keys = keys * f64::from(scene.playback.frames) / f64::from(small.playback.frames.max(1));
         let scale = if small.playback.width < scene.playback.width { PICTURE } else { 1.0 };
         Ok(Trial { family, rewarped, bytes: (keys + picture / scale) as u64, psnr })
@@ -61,7 +60,7 @@ pub fn charts(scene: &Scene, settings: &Settings, rewarp: Option<bool>, progress
     progress("trying charts", 0.0);
     // Side by side: much of each is a matter of one thread.
     let of = |&family: &Family| {
-        let charting = atlas::charts(&small, &hits, &settings_of(family, false).atlas).map_err(BakeError::from);
+        let charting = atlas::charts(&small, hits, &settings_of(family, false).atlas).map_err(BakeError::from);
         let trial = charting.and_then(|charting| Ok((tried(charting.clone(), family, rewarp.unwrap_or(false))?, charting)));
         progress("trying charts", (done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / steps as f64);
         trial
@@ -101,11 +100,11 @@ fn halved(scene: &Scene, settings: &Settings) -> (Scene, Settings) {
 }
 
 /// Bytes of keys, bytes of the picture, and PSNR against the truth.
-fn attempt(scene: &Scene, flat: &Flat, settings: &Settings, (truth, frames): (&Truth<'_>, &[u32])) -> Result<(f64, f64, f64), BakeError> {
+fn attempt(scene: &Scene, flat: &Flat, settings: &Settings, pictures: &[(u32, Vec<u8>)]) -> Result<(f64, f64, f64), BakeError> {
     something_seen(flat)?;
     let encoded = bake::encode(scene, flat, settings, &|_, _| {})?;
     let picture = crate::encode::image_bytes(&flat.atlas.image, settings.atlas.storage);
-    let psnr = verify::against_truth(&encoded.bundle, truth, frames, &|_, _| {})?.psnr_mean;
+    let psnr = verify::against_pictures(&encoded.bundle, pictures)?;
     Ok(((encoded.bundle.len().saturating_sub(picture)) as f64, picture as f64, psnr))
 }
 

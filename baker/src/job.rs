@@ -3,6 +3,7 @@
 
 use crate::atlas::{self, Storage};
 use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings, Sparing};
+use crate::cast::Cast;
 use crate::chart::{self, Choice, Family};
 use crate::choose;
 use crate::fewer;
@@ -15,7 +16,6 @@ use crate::scene::Scene;
 use crate::straight;
 use crate::truth::{Truth, spread};
 use crate::{tune, verify};
-use std::cell::LazyCell;
 use std::time::Instant;
 
 /// Screens wider than this get cells of 16 pixels unless told otherwise.
@@ -215,15 +215,21 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
     }
     let choice_seconds = start.elapsed().as_secs_f64();
     let settings = options.settings(scene.playback.width);
+    let cast = Cast::new(scene, progress);
+    let paint_start = Instant::now();
+    let painter = (!options.plain).then(|| Painter::new(&cast, progress));
+    let paint_seconds = paint_start.elapsed().as_secs_f64();
     let Chosen { mut flat, encoded, settings, search_seconds, warnings } = match options.goal {
         Goal::AsSet => {
-            let flat = bake::flatten(scene, &settings.atlas, progress)?;
+            let flat = bake::flatten_cast(&cast, &settings.atlas, progress)?;
             something_seen(&flat)?;
             let encoded = bake::encode(scene, &flat, &settings, progress)?;
             Chosen { flat, encoded, settings, search_seconds: 0.0, warnings: Vec::new() }
         }
-        goal => tune::search(scene, options, goal, whole, progress)?,
+        goal => tune::search((&cast, painter.as_ref()), options, goal, whole, progress)?,
     };
+    // Large, and of no more use.
+    drop(cast);
     let finer_start = Instant::now();
     let quality = verify::briefly(&encoded.bundle, &flat.atlas.image, &flat.atlas.gbuffer)?;
     let free = options.goal == Goal::AsSet && options.cell.is_none() && options.key_interval.is_none();
@@ -237,10 +243,8 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
     let (mut made, spaces) = if bends { straight::choose(scene, &flat, made, progress)? } else { (made, Vec::new()) };
     let finer = other.map(|other| other.said(&made));
     let (search_seconds, paint_start) = (search_seconds + finer_start.elapsed().as_secs_f64(), Instant::now());
-    // Its hierarchy is built where somebody looks at it only.
-    let truth = LazyCell::new(|| Truth::new(scene));
-    let repainted = !options.plain && Painter::new(&truth, progress).repaint(&mut made, &mut flat.atlas, options.goal)?;
-    let (paint_seconds, verify_start) = (paint_start.elapsed().as_secs_f64(), Instant::now());
+    let repainted = painter.map_or(Ok(false), |painter| painter.repaint(&mut made, &mut flat.atlas, options.goal))?;
+    let (paint_seconds, verify_start) = (paint_seconds + paint_start.elapsed().as_secs_f64(), Instant::now());
     let Made { settings, encoded, .. } = made;
     let part = |done: u32, total: u32| f64::from(done) / f64::from(total.max(1));
     progress("comparing with exact rays", 0.0);
@@ -257,7 +261,7 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
     } else {
         progress("comparing with the truth", 0.0);
         let bar = |d, n| progress("comparing with the truth", part(d, n));
-        Some(verify::against_truth(&encoded.bundle, &truth, &frames, &bar)?)
+        Some(verify::against_truth(&encoded.bundle, &Truth::new(scene), &frames, &bar)?)
     };
     let seconds = Seconds {
         total: options.load_seconds + start.elapsed().as_secs_f64(),

@@ -6,6 +6,7 @@
 pub mod atlas;
 pub mod bake;
 pub mod camera;
+pub mod cast;
 pub mod causes;
 pub mod chart;
 pub mod choose;

@@ -8,18 +8,19 @@
 
 use crate::atlas::{self, Atlas, SourceImage};
 use crate::bake::Progress;
+use crate::cast::Cast;
 use crate::encode;
+use crate::gbuffer::{BACKGROUND, Sample};
 use crate::job::Goal;
 use crate::made::Made;
-use crate::truth::{Truth, spread};
+use crate::shade::Shader;
+use crate::truth::spread;
 use crate::verify::{self, VerifyError};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Frames looked at, evenly spread.
 const FRAMES: u32 = 128;
-/// Samples of the scene along each side of a pixel. One is enough, for a texel is shown by many pixels; with more, texels that are seen along outlines take
-/// in what lies beyond: .1 to .2 dB closer to the antialiased scene where outlines are not softened, as much farther where they are, and smudges.
-const SIDE: u32 = 1;
 /// Bytes that the frames looked at may take: of large ones there are fewer.
 const MOST_BYTES: usize = 256 << 20;
 /// Frames that one thread looks at in a row.
@@ -55,7 +56,9 @@ fn error(shown: &[Shown], colours: impl Iterator<Item = [u8; 3]>) -> f64 {
     shown.iter().zip(colours).map(|(shown, colour)| shown.error(colour)).sum()
 }
 
-/// What the scene has in the pixels of some frames.
+/// What the scene has in the pixels of some frames, at their centres. One sample of each is enough, for a texel is shown by many pixels; with more, texels
+/// that are seen along outlines take in what lies beyond: .1 to .2 dB closer to the antialiased scene where outlines are not softened, as much farther where
+/// they are, and smudges.
 pub struct Painter {
     frames: Vec<u32>,
     /// R, G, B, row by row.
@@ -63,18 +66,25 @@ pub struct Painter {
 }
 
 impl Painter {
-    /// Renders them; `progress` hears how many of them are done.
+    /// Colours what rays hit; `progress` hears how many of the frames are done.
     #[must_use]
-    pub fn new(truth: &Truth<'_>, progress: Progress<'_>) -> Self {
-        let [width, height, frames] = truth.shape();
-        let most = MOST_BYTES / (3 * width as usize * height as usize).max(1);
-        let frames = spread(frames, FRAMES.min(most.max(1) as u32));
-        let total = frames.len().max(1) as f64;
-        let render = |(done, &frame): (usize, &u32)| {
-            progress("painting", done as f64 / total);
-            truth.sampled(frame, SIDE)
+    pub fn new(cast: &Cast<'_>, progress: Progress<'_>) -> Self {
+        let Cast { scene, hits, .. } = cast;
+        let (width, size) = (hits.width as usize, hits.width as usize * hits.height as usize);
+        let most = MOST_BYTES / (3 * size).max(1);
+        let frames = spread(hits.frames, FRAMES.min(most.max(1) as u32));
+        let (shader, total, done) = (Shader::new(scene), frames.len().max(1), AtomicUsize::new(0));
+        let colour = |at: usize, sample: &Sample| match sample.surface {
+            BACKGROUND => shader.background((at % width) as f64 + 0.5, (at / width) as f64 + 0.5),
+            surface => shader.shade(surface, [sample.b, sample.c].map(f64::from), 0.0),
         };
-        let pictures = frames.iter().enumerate().map(render).collect();
+        let coloured = |&frame: &u32| {
+            let samples = hits.samples.iter().skip(frame as usize * size).take(size);
+            let picture = samples.enumerate().flat_map(|(at, sample)| colour(at, sample).to_array().map(|v| (v + 0.5) as u8)).collect();
+            progress("painting", (done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / total as f64);
+            picture
+        };
+        let pictures = frames.par_iter().map(coloured).collect();
         Self { frames, pictures }
     }
 
@@ -161,6 +171,7 @@ mod tests {
     use crate::bake::{self, Settings};
     use crate::inspect::Inspection;
     use crate::scene::{Scene, builtin};
+    use crate::truth::Truth;
     use cubist_core::format::ATLAS;
 
     fn small(name: &str) -> (Scene, Atlas, Made) {
@@ -173,7 +184,7 @@ mod tests {
     }
 
     fn repainted(scene: &Scene, atlas: &mut Atlas, made: &mut Made, goal: Goal) -> bool {
-        Painter::new(&Truth::new(scene), &|_, _| {}).repaint(made, atlas, goal).unwrap()
+        Painter::new(&Cast::new(scene, &|_, _| {}), &|_, _| {}).repaint(made, atlas, goal).unwrap()
     }
 
     /// The mean PSNR against the antialiased scene, all frames.

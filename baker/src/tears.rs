@@ -1,9 +1,8 @@
 //! Tears: where neighbouring pixels see the same chart, but not the same part of the surface: terrain behind a ridge,
 //! the far side of a ring. Found by casting rays between the two; they go to `folds`.
 
-use crate::gbuffer::{GBuffer, Hits, Lens, Sample};
-use crate::scene::Scene;
-use crate::trace::Tracer;
+use crate::cast::Cast;
+use crate::gbuffer::{GBuffer, Lens, Sample};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -25,24 +24,29 @@ const FLAT: f64 = 0.1;
 
 /// One byte a pixel of the G-buffer: [`RIGHT`], [`DOWN`] and [`NEXT`].
 #[must_use]
-pub fn find(scene: &Scene, tracer: &Tracer<'_>, hits: &Hits, gbuffer: &GBuffer) -> Vec<u8> {
+pub fn find(cast: &Cast<'_>, gbuffer: &GBuffer) -> Vec<u8> {
     let (width, height) = (gbuffer.width as usize, gbuffer.height as usize);
+    // Rays halve what is left between two frames, so there are few moments.
+    let moments = |frame: usize| (1..1 << BISECTIONS).map(move |part| frame as f64 + f64::from(part) / f64::from(1 << BISECTIONS));
+    let between = |frame: usize| moments(frame).map(|moment| Lens::at(cast.scene, moment)).collect();
+    let between: Vec<Vec<Lens>> = (0..gbuffer.frames as usize).into_par_iter().map(between).collect();
     let mut tears = vec![0u8; gbuffer.label.len()];
     tears.par_chunks_mut(width.max(1)).enumerate().for_each(|(line, out)| {
         let (frame, y) = (line / height, line % height);
-        let lens = Lens::new(scene, frame as u32);
+        let lens = Lens::new(cast.scene, frame as u32);
         let last = frame + 1 == gbuffer.frames as usize;
         for (x, bits) in out.iter_mut().enumerate() {
             let pixel = line * width + x;
-            let pair = Pair { scene, tracer, hits, gbuffer, pixel };
+            let pair = Pair { cast, gbuffer, pixel };
             let at = [x as f64 + 0.5, y as f64 + 0.5];
-            if x + 1 < width && pair.torn(pixel + 1, |t| Some((lens, [at[0] + t, at[1]]))) {
+            if x + 1 < width && pair.torn(RIGHT, pixel + 1, |t| (lens, [at[0] + t, at[1]])) {
                 *bits |= RIGHT;
             }
-            if y + 1 < height && pair.torn(pixel + width, |t| Some((lens, [at[0], at[1] + t]))) {
+            if y + 1 < height && pair.torn(DOWN, pixel + width, |t| (lens, [at[0], at[1] + t])) {
                 *bits |= DOWN;
             }
-            if !last && pair.torn(pixel + width * height, |t| Some((Lens::at(scene, frame as f64 + t), at))) {
+            let moment = |t: f64| between[frame][(t * f64::from(1 << BISECTIONS)) as usize - 1];
+            if !last && pair.torn(NEXT, pixel + width * height, |t| (moment(t), at)) {
                 *bits |= NEXT;
             }
         }
@@ -52,16 +56,14 @@ pub fn find(scene: &Scene, tracer: &Tracer<'_>, hits: &Hits, gbuffer: &GBuffer) 
 
 /// A pixel and what it is seen with.
 struct Pair<'a> {
-    scene: &'a Scene,
-    tracer: &'a Tracer<'a>,
-    hits: &'a Hits,
+    cast: &'a Cast<'a>,
     gbuffer: &'a GBuffer,
     pixel: usize,
 }
 
 impl Pair<'_> {
-    /// Whether the pixel and `other` see torn parts of one chart; `ray` gives the ray at 0..=1 between the two.
-    fn torn(&self, other: usize, ray: impl Fn(f64) -> Option<(Lens, [f64; 2])>) -> bool {
+    /// Whether the pixel and `other`, on this `side` of it, see torn parts of one chart; `ray` gives the ray at 0..=1 between the two.
+    fn torn(&self, side: u8, other: usize, ray: impl Fn(f64) -> (Lens, [f64; 2])) -> bool {
         let label = self.gbuffer.label[self.pixel];
         if label == 0 || label != self.gbuffer.label[other] {
             return false;
@@ -70,7 +72,13 @@ impl Pair<'_> {
         if (a - c).abs().max((b - d).abs()) < CLOSE {
             return false;
         }
-        let (from, to) = (self.point(self.hits.samples[self.pixel]), self.point(self.hits.samples[other]));
+        self.cast.gaps.open(self.pixel, side, || self.open(other, ray))
+    }
+
+    /// Whether there is a gap between what the pixel sees and what `other` does.
+    fn open(&self, other: usize, ray: impl Fn(f64) -> (Lens, [f64; 2])) -> bool {
+        let samples = &self.cast.hits.samples;
+        let (from, to) = (self.point(samples[self.pixel]), self.point(samples[other]));
         let gap = (to.0 - from.0).length();
         let off = |normal: DVec3| (to.0 - from.0).dot(normal).abs();
         if off(from.1).max(off(to.1)) < FLAT * gap {
@@ -79,10 +87,10 @@ impl Pair<'_> {
         let (mut ends, mut at) = ([from.0, to.0], [0.0, 1.0]);
         for _ in 0..BISECTIONS {
             let middle = 0.5 * (at[0] + at[1]);
-            let Some((lens, [x, y])) = ray(middle) else { return false };
+            let (lens, [x, y]) = ray(middle);
             let direction = lens.direction(x, y);
             // Something else in between: the two do not meet here.
-            let Some(hit) = self.tracer.hit(lens.eye, direction) else { return true };
+            let Some(hit) = self.cast.tracer.hit(lens.eye, direction) else { return true };
             let point = lens.eye + direction * hit.t;
             let half = usize::from((point - ends[0]).length() < (ends[1] - point).length());
             // The larger half is looked into further.
@@ -96,6 +104,6 @@ impl Pair<'_> {
 
     /// The point that a sample sees, and its face's unit normal.
     fn point(&self, sample: Sample) -> (DVec3, DVec3) {
-        (sample.point(self.scene), sample.normal(self.scene))
+        (sample.point(self.cast.scene), sample.normal(self.cast.scene))
     }
 }

@@ -1,4 +1,4 @@
-//! The truth: the scene itself, ray traced with 16 samples a pixel or fewer, without any source image in between.
+//! The truth: the scene itself, ray traced with 16 samples a pixel, without any source image in between.
 //! Rays come from the camera path, colours from [`Shader`]; pictures go to `verify`.
 
 use crate::gbuffer::Lens;
@@ -25,32 +25,21 @@ impl<'a> Truth<'a> {
         Self { scene, tracer: Tracer::new(scene), shader: Shader::new(scene) }
     }
 
-    /// Width, height and number of the frames.
-    pub(crate) fn shape(&self) -> [u32; 3] {
-        let play = &self.scene.playback;
-        [play.width, play.height, play.frames]
-    }
-
     /// Renders frame `frame`: R, G, B, row by row; the same bytes on any number of threads.
     #[must_use]
     pub fn frame(&self, frame: u32) -> Vec<u8> {
-        self.sampled(frame, SIDE)
-    }
-
-    /// The same, with so many samples along each side of a pixel.
-    pub(crate) fn sampled(&self, frame: u32, side: u32) -> Vec<u8> {
         let (width, height) = (self.scene.playback.width as usize, self.scene.playback.height as usize);
         let lens = Lens::new(self.scene, frame);
         let mut picture = vec![0u8; width * height * 3];
         picture.par_chunks_mut((width * 3).max(1)).enumerate().for_each(|(y, row)| {
             for (x, pixel) in row.as_chunks_mut::<3>().0.iter_mut().enumerate() {
                 let mut sum = Vec3::ZERO;
-                for sample in 0..side * side {
-                    let offset = |i: u32| (f64::from(i) + 0.5) / f64::from(side);
-                    sum += self.sample(&lens, x as f64 + offset(sample % side), y as f64 + offset(sample / side));
+                for sample in 0..SIDE * SIDE {
+                    let offset = |i: u32| (f64::from(i) + 0.5) / f64::from(SIDE);
+                    sum += self.sample(&lens, x as f64 + offset(sample % SIDE), y as f64 + offset(sample / SIDE));
                 }
                 // Colours are at most 255 a component: the mean fits a byte.
-                *pixel = (sum / (side * side) as f32).to_array().map(|v| (v + 0.5) as u8);
+                *pixel = (sum / (SIDE * SIDE) as f32).to_array().map(|v| (v + 0.5) as u8);
             }
         });
         picture

@@ -4,17 +4,15 @@
 
 use crate::atlas::{self, Storage};
 use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings, Sparing};
+use crate::cast::Cast;
 use crate::climb::{Free, Step, climb};
 use crate::encode::{self, image_bytes};
-use crate::gbuffer::Hits;
 use crate::job::{self, Chosen, Goal, Options, Whole};
 use crate::metrics;
 use crate::repaint::Painter;
 use crate::report::grouped;
 use crate::samples::Samples;
 use crate::scene::Scene;
-use crate::trace::Tracer;
-use crate::truth::Truth;
 use crate::verify;
 use std::time::Instant;
 
@@ -39,23 +37,20 @@ const MOST_MEMORY: usize = 128 << 10;
 /// How far a predicted size may lie over the budget and still be tried: coarser keys take less.
 const SLACK: f64 = 1.15;
 
-/// Searches for `goal`. `whole`: what is too large for a [`Goal::Ram`], where there is such a bundle.
+/// Searches for `goal`, with colours by `painter`, if any. `whole`: what is too large for a [`Goal::Ram`], where there is such a bundle.
 ///
 /// # Errors
 /// [`BakeError::Budget`], [`BakeError::Psnr`] or [`BakeError::Ram`] where nothing reaches the goal, with the nearest that can be; whatever
 /// flattening and encoding say.
 pub(crate) fn search(
-    scene: &Scene,
+    (cast, painter): (&Cast<'_>, Option<&Painter>),
     options: &Options,
     goal: Goal,
     whole: Option<Whole>,
     progress: Progress<'_>,
 ) -> Result<Chosen, BakeError> {
-    let start = Instant::now();
-    progress("building the hierarchy", 0.0);
-    let tracer = Tracer::new(scene);
-    let hits = Hits::cast(scene, &tracer, &|done, total| progress("casting rays", done as f64 / total.max(1) as f64));
-    let search = Search { scene, options, tracer, hits, ray_seconds: start.elapsed().as_secs_f64(), progress };
+    let (start, scene) = (Instant::now(), cast.scene);
+    let search = Search { scene, options, cast, painter, progress };
     let mut chosen = match goal {
         Goal::Budget(budget) => search.budget(budget)?,
         Goal::Psnr(asked) => search.psnr(asked)?,
@@ -66,7 +61,7 @@ pub(crate) fn search(
             search.finish(flat, settings, Vec::new())?
         }
     };
-    let kept = chosen.flat.ray_seconds + chosen.flat.atlas_seconds + chosen.encoded.seconds;
+    let kept = chosen.flat.atlas_seconds + chosen.encoded.seconds;
     chosen.search_seconds = (start.elapsed().as_secs_f64() - kept).max(0.0);
     Ok(chosen)
 }
@@ -75,9 +70,8 @@ pub(crate) fn search(
 pub(crate) struct Search<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) options: &'a Options,
-    tracer: Tracer<'a>,
-    hits: Hits,
-    ray_seconds: f64,
+    cast: &'a Cast<'a>,
+    painter: Option<&'a Painter>,
     progress: Progress<'a>,
 }
 
@@ -129,7 +123,7 @@ struct Keys {
 impl Search<'_> {
     /// The source image that `source` asks for, and what goes with it.
     pub(crate) fn flat(&self, source: atlas::Settings) -> Result<Flat, BakeError> {
-        let flat = bake::flatten_hits(self.scene, (&self.tracer, &self.hits, self.ray_seconds), &source, &|_, _| {})?;
+        let flat = bake::flatten_cast(self.cast, &source, &|_, _| {})?;
         job::something_seen(&flat)?;
         Ok(flat)
     }
@@ -317,7 +311,6 @@ impl Search<'_> {
     /// The smallest bundle whose mean PSNR against exact rays reaches `asked`.
     fn psnr(&self, asked: f64) -> Result<Chosen, BakeError> {
         let mut source = self.options.source();
-        let painter = (!self.options.plain).then(|| Painter::new(&Truth::new(self.scene), self.progress));
         let steps = CELLS.len() * INTERVALS.len() + STEPS;
         let (mut step, mut nearest, mut room, mut exceeded) = (0, 0.0f64, MOST_MEMORY, None);
         // Of bundles that reach it the smaller one counts, of those that do not the better one.
@@ -325,7 +318,7 @@ impl Search<'_> {
             self.say(step, steps);
             step += 1;
             let Some(Encoded { bundle, .. }) = possible(self.encode(flat, settings), &mut exceeded)? else { return Ok(None) };
-            let painted = painter.as_ref().map_or(Ok(None), |painter| painter.painted(&bundle, &flat.atlas.image, &settings.atlas))?;
+            let painted = self.painter.map_or(Ok(None), |painter| painter.painted(&bundle, &flat.atlas.image, &settings.atlas))?;
             let (bundle, image) = painted.map_or((bundle, None), |(bundle, image)| (bundle, Some(image)));
             let psnr = verify::briefly(&bundle, image.as_ref().unwrap_or(&flat.atlas.image), &flat.atlas.gbuffer)?.psnr_mean;
             let (reached, memory) = (psnr >= asked, verify::memory(&bundle)?);

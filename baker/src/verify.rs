@@ -413,6 +413,21 @@ pub fn against_truth(
     })
 }
 
+/// The mean PSNR, dB, of a finished bundle's frames against these `pictures` of the scene: which frame, and R, G, B, row by row.
+///
+/// # Errors
+/// [`VerifyError`] where the player refuses the bytes.
+pub(crate) fn against_pictures(bytes: &[u8], pictures: &[(u32, Vec<u8>)]) -> Result<f64, VerifyError> {
+    let (mut psnr, mut played) = (0.0, Vec::new());
+    with_screen(&Bundle::parse(bytes)?, |mut screen| {
+        for (frame, exact) in pictures {
+            screen.play(*frame, &mut played);
+            psnr += metrics::psnr(metrics::mean_squared_error(&played, exact));
+        }
+    })?;
+    Ok(psnr / pictures.len().max(1) as f64)
+}
+
 /// Bytes of working memory that a player of a bundle asks for.
 ///
 /// # Errors

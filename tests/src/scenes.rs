@@ -4,9 +4,9 @@
 use anyhow::{Context, Result};
 use cubist_baker::atlas::Storage;
 use cubist_baker::bake::{self, Encoded, Flat, Settings};
+use cubist_baker::cast::Cast;
 use cubist_baker::repaint::Painter;
 use cubist_baker::scene::{Scene, builtin};
-use cubist_baker::truth::Truth;
 
 /// The screen of the reduced setting, pixels.
 pub const SIZE: [u32; 2] = [160, 120];
@@ -63,7 +63,7 @@ pub fn raw_and_packed(scene: &Scene, settings: &Settings) -> Result<(Flat, [Vec<
 /// Those of the baker, with the scene's name.
 pub fn painted(scene: &Scene, settings: &Settings) -> Result<(Flat, Encoded)> {
     let (mut flat, mut encoded) = bake(scene, settings)?;
-    let painter = Painter::new(&Truth::new(scene), &|_, _| {});
+    let painter = Painter::new(&Cast::new(scene, &|_, _| {}), &|_, _| {});
     let painted = painter.painted(&encoded.bundle, &flat.atlas.image, &settings.atlas).with_context(|| format!("paint {}", scene.name))?;
     if let Some((bundle, image)) = painted {
         (encoded.bundle, flat.atlas.image) = (bundle, image);
