@@ -4,7 +4,6 @@
 
 use crate::atlas::Texture;
 use crate::fixed::{PLAY_BITS, PlayUv};
-use crate::form::Form;
 use crate::format::{LabelRecord, MASKED, STRIP};
 use core::ops::Range;
 
@@ -94,21 +93,21 @@ impl Chart {
         if all && (!self.masked() || filled(texture, &bounds.wider(PlayUv { u: SLACK, v: SLACK }))) { Cover::All } else { Cover::Part }
     }
 
-    /// Passes those of the rectangle's edges on that what lies within `bounds` may cross; `forms`: how it goes, u and v.
+    /// Passes those of the rectangle's edges on that what lies within `bounds` may cross, each with what is said of its coordinate: u or v.
     #[inline(always)]
-    pub fn crossed(&self, [u, v]: &[Form; 2], &Bounds { low, high }: &Bounds, mut pass: impl FnMut(Edge)) {
+    pub fn crossed<T: Copy>(&self, [u, v]: [T; 2], &Bounds { low, high }: &Bounds, mut pass: impl FnMut(T, Edge)) {
         // One after the other: a list of them would be written to memory.
         if low.u < self.left.wrapping_add(SLACK) {
-            pass(Edge::new(u, self.left, false));
+            pass(u, Edge { at: self.left, ends: [low.u, high.u], upper: false });
         }
         if high.u >= self.right.wrapping_sub(SLACK) {
-            pass(Edge::new(u, self.right, true));
+            pass(u, Edge { at: self.right, ends: [low.u, high.u], upper: true });
         }
         if low.v < self.top.wrapping_add(SLACK) {
-            pass(Edge::new(v, self.top, false));
+            pass(v, Edge { at: self.top, ends: [low.v, high.v], upper: false });
         }
         if high.v >= self.bottom.wrapping_sub(SLACK) {
-            pass(Edge::new(v, self.bottom, true));
+            pass(v, Edge { at: self.bottom, ends: [low.v, high.v], upper: true });
         }
     }
 }
@@ -175,17 +174,20 @@ impl Bounds {
 /// An edge of a chart's rectangle beside a block.
 #[derive(Clone, Copy, Debug)]
 pub struct Edge {
-    /// How far beyond it the block's pixels are, Q16 texels.
-    pub beyond: Form,
+    /// The coordinate that is the same all along it, Q16 texels.
+    pub at: i32,
+    /// Between which the block has that.
+    pub ends: [i32; 2],
     /// The chart is on the near side; else on the far one.
     pub upper: bool,
 }
 
 impl Edge {
-    /// The edge at `at`.
+    /// How far the block's pixels are from it, at most, either way.
     #[inline(always)]
-    const fn new(form: &Form, at: i32, upper: bool) -> Self {
-        Self { beyond: Form { at: form.at.wrapping_sub(at), ..*form }, upper }
+    pub fn reach(&self) -> u32 {
+        let [low, high] = self.ends.map(|end| end.abs_diff(self.at));
+        low.max(high)
     }
 }
 

@@ -114,24 +114,45 @@ impl Form {
         self.step = self.step.wrapping_add(self.turn);
     }
 
-    /// Which of the first eight pixels of the first row have a number below zero, a bit each, where it bends nowhere across; the other bits are as the last
-    /// one, or zero.
+    /// The numbers of the first eight columns in less room, if none of them is further from zero than `reach`: rounded to one in 2^14 of that or less.
     #[must_use]
     #[inline(always)]
-    pub fn straight_negative(&self) -> u32 {
-        let Self { at, step, .. } = *self;
-        let mut value = at.wrapping_add(step.wrapping_mul(7));
-        // Most often all are on one side.
-        if at ^ value >= 0 {
-            return (at >> 31) as u32;
+    pub const fn pairs(&self, reach: u32) -> Pairs {
+        let shift = 18u32.saturating_sub(reach.leading_zeros());
+        let Self { at, down, fall, step, turn, bend } = *self;
+        let less = Self {
+            at: 0,
+            down: rounded(down, shift),
+            fall: rounded(fall, shift),
+            step: rounded(step, shift),
+            turn: rounded(turn, shift),
+            bend: rounded(bend, shift),
+        };
+        // As it is in the middle, so that what is rounded adds up to least.
+        let at = Self { at, ..*self }.middle().wrapping_shr(shift).wrapping_sub(less.middle());
+        let Self { down, fall, step, turn, bend, .. } = less;
+        // A number in both halves, and one in the upper half only.
+        const fn both(x: i32) -> u32 {
+            (x as u32).wrapping_add((x as u32).wrapping_shl(16))
         }
-        // From the last one back: the first one's bit is the lowest.
-        let mut below = 0;
-        for _ in 0..8 {
-            below = below << 1 | value as u32 >> 31;
-            value = value.wrapping_sub(step);
+        const fn upper(x: i32) -> u32 {
+            (x as u32).wrapping_shl(16)
         }
-        below
+        Pairs {
+            at: both(at).wrapping_add(upper(step.wrapping_mul(4).wrapping_add(bend.wrapping_mul(6)))),
+            down: both(down).wrapping_add(upper(turn.wrapping_mul(4))),
+            fall: both(fall),
+            step: both(step).wrapping_add(upper(bend.wrapping_mul(4))),
+            turn: both(turn),
+            bend: both(bend),
+        }
+    }
+
+    /// The number at the middle of eight rows of eight pixels, half a pixel off.
+    #[inline(always)]
+    const fn middle(&self) -> i32 {
+        let straight = self.step.wrapping_add(self.down).wrapping_add(self.turn.wrapping_mul(4));
+        self.at.wrapping_add(straight.wrapping_mul(4)).wrapping_add(self.bend.wrapping_add(self.fall).wrapping_mul(6))
     }
 
     /// Which of the next `pixels` pixels of the first row have a number below zero: a bit each.
@@ -160,6 +181,37 @@ impl Form {
             (0..pixels).for_each(|_| back(&mut below));
         }
         below
+    }
+}
+
+/// How two numbers go from pixel to pixel, one in each half of a word: as a [`Form`]'s, the upper one's pixels four to the right of the lower one's.
+#[derive(Clone, Copy, Debug)]
+pub struct Pairs {
+    at: u32,
+    down: u32,
+    fall: u32,
+    step: u32,
+    turn: u32,
+    bend: u32,
+}
+
+impl Pairs {
+    /// Which of the first row's eight pixels have a number below zero, a bit each in the uppermost byte, the leftmost lowest. One row further down.
+    #[inline(always)]
+    pub const fn next_negative(&mut self) -> u32 {
+        const SIGNS: u32 = 0x8000_8000;
+        let Self { at: first, down, fall, step, turn, bend } = *self;
+        let second = first.wrapping_add(step);
+        let step_on = step.wrapping_add(bend);
+        let third = second.wrapping_add(step_on);
+        let fourth = third.wrapping_add(step_on).wrapping_add(bend);
+        // Nibbles of both halves' signs, the last pixel's uppermost.
+        let mut signs = first & SIGNS;
+        signs = second & SIGNS | signs >> 1;
+        signs = third & SIGNS | signs >> 1;
+        signs = fourth & SIGNS | signs >> 1;
+        *self = Self { at: first.wrapping_add(down), down: down.wrapping_add(fall), step: step.wrapping_add(turn), ..*self };
+        (signs | signs << 12) & 0xff00_0000
     }
 }
 
@@ -205,5 +257,31 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn pairs_tell_signs_but_where_a_number_is_next_to_nothing() {
+        let mut seed = 7u32;
+        let mut next = |below: u32| {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            ((u64::from(seed) * u64::from(below)) >> 32) as i32 - (below / 2) as i32
+        };
+        let (mut wrong, mut below, mut all) = (0, 0, 0);
+        for round in 0..4000u32 {
+            let (size, bent) = (1 << (10 + round % 16), if round % 3 == 0 { 0 } else { 1 << (8 + round % 14) });
+            let corners = [(); 4].map(|()| next(size));
+            let form = Form::new(corners, [next(bent + 1), next(bent + 1)], 3);
+            let places = || (0..8).flat_map(|y| (0..8).map(move |x| [x, y]));
+            let reach = places().map(|at| form.at(at).unsigned_abs()).max().unwrap();
+            let mut pairs = form.pairs(reach);
+            let rows = [(); 8].map(|()| pairs.next_negative());
+            for [x, y] in places() {
+                let (number, told) = (form.at([x, y]), rows[y as usize] >> (24 + x) & 1 == 1);
+                // Half a unit for each number rounded, times how often it counts, and a unit for the other half of the word.
+                assert!(told == (number < 0) || number.unsigned_abs() <= 40 * (reach >> 13) + 40, "{form:?} {reach} {x} {y} {number}");
+                (wrong, below, all) = (wrong + u32::from(told != (number < 0)), below + u32::from(told), all + 1);
+            }
+        }
+        assert!(wrong < all / 1000 && below > all / 4 && below < all * 3 / 4, "{wrong} and {below} of {all}");
     }
 }

@@ -46,6 +46,15 @@ impl Patch {
         Bounds::around(&self.corners).wider(self.bulge())
     }
 
+    /// How u, or `down` the picture v, goes from pixel to pixel, where it is 2^`log2` pixels wide and high.
+    #[must_use]
+    #[inline(always)]
+    pub fn form(&self, down: bool, log2: u32) -> Form {
+        let [u, v] = self.axes();
+        let (corners, sums) = if down { v } else { u };
+        Form::new(corners, sums, log2)
+    }
+
     /// How u and v go from pixel to pixel, where it is 2^`log2` pixels wide and high.
     #[must_use]
     #[inline(always)]

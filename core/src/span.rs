@@ -216,8 +216,9 @@ pub fn inside(chart: &Chart, mut shown: u32, pixels: u32, forms: &[Form; 2], tex
         Cover::All => return shown,
         Cover::Part => {}
     }
-    chart.crossed(forms, &bounds, |edge| {
-        let near = edge.beyond.negative(pixels);
+    let [u, v] = forms;
+    chart.crossed([u, v], &bounds, |form, edge| {
+        let near = Form { at: form.at.wrapping_sub(edge.at), ..*form }.negative(pixels);
         shown &= if edge.upper { near } else { !near };
     });
     if chart.masked() { covered(shown, span, texture) } else { shown }

@@ -2,7 +2,7 @@
 //! Sheets come from `site`, tests from `coverage` and `span`; `plan` asks, `draw` paints what comes out.
 
 use crate::atlas::Texture;
-use crate::coverage::{Bounds, Cover, Edge};
+use crate::coverage::{Bounds, Cover};
 use crate::form::Form;
 use crate::format::MAX_SHEETS;
 use crate::lists::{CHART, FIELD};
@@ -168,20 +168,19 @@ pub fn share(
         if !fields.all(|which| above(site, sheet, which, offset, &mut shown)) {
             continue;
         }
-        let cell = site.cell(sheet);
-        let patch = site.block(&cell, offset);
+        let patch = site.block(&site.cell(sheet), offset);
         let bounds = patch.bounds();
         if tested && sheet.test() != FIELD {
             match chart.cover(&bounds, &site.texture) {
                 Cover::Nothing => continue,
                 Cover::Part if shown != Shown::NONE => {
-                    let forms = site.forms(&cell, offset);
-                    chart.crossed(&forms, &bounds, |Edge { beyond, upper }| {
-                        let near = negative(beyond, log2);
-                        shown = if upper { shown.and(near) } else { shown.and_not(near) };
+                    chart.crossed([false, true], &bounds, |down, edge| {
+                        let form = patch.form(down, log2);
+                        let near = negative(&Form { at: form.at.wrapping_sub(edge.at), ..form }, edge.reach(), log2);
+                        shown = if edge.upper { shown.and(near) } else { shown.and_not(near) };
                     });
                     if chart.masked() && shown != Shown::NONE {
-                        shown = masked(shown, forms, log2, &site.texture);
+                        shown = masked(shown, patch.forms(log2), log2, &site.texture);
                     }
                 }
                 _ => {}
@@ -205,7 +204,7 @@ pub fn share(
             }
         } else {
             // What does not show may lie anywhere.
-            shown.parts(site.forms(&cell, offset), log2, (room, near), add)?;
+            shown.parts(patch.forms(log2), log2, (room, near), add)?;
         }
         if left == Shown::NONE {
             break;
@@ -217,31 +216,25 @@ pub fn share(
 /// Leaves those pixels of a block in `shown` where field `which` of `sheet` is above zero; false where it is nowhere.
 #[inline(always)]
 fn above(site: &Site<'_, '_, '_>, sheet: &Sheet, which: usize, offset: [u32; 2], shown: &mut Shown) -> bool {
-    let cover = field_cover(site.field_corners(sheet, which, offset));
+    let corners = site.field_corners(sheet, which, offset);
+    let cover = field_cover(corners);
     if cover == Cover::Part {
-        // What is below zero where the field is above.
-        *shown = shown.and(negative(site.field(sheet, which, offset).negated(), site.block_log2()));
+        // What is below zero where the field is above. It bends nowhere: farthest from zero it is in a corner.
+        let (below, log2) = (corners.map(i32::wrapping_neg), site.block_log2());
+        let reach = below.iter().fold(0, |reach, corner| corner.unsigned_abs().max(reach));
+        *shown = shown.and(negative(&Form::new(below, [0; 2], log2), reach, log2));
     }
     cover != Cover::Nothing
 }
 
-/// At which pixels of a block `form` is below zero.
+/// At which pixels of a block `form`, which is nowhere further from zero than `reach` there, is below zero; whatever beside the block.
 // Called from several places, and long.
 #[inline(never)]
-fn negative(mut form: Form, log2: u32) -> Shown {
-    // Most often it bends nowhere: fields never do.
-    if log2 == 3 && form.bend == 0 {
-        return Shown::rows(log2, |_| {
-            let row = form.straight_negative();
-            form.next_row();
-            row
-        });
-    }
-    Shown::rows(log2, |_| {
-        let row = form.negative(1u32.wrapping_shl(log2));
-        form.next_row();
-        row
-    })
+fn negative(form: &Form, reach: u32, log2: u32) -> Shown {
+    let mut pairs = form.pairs(reach);
+    let mut four = || (0..4).fold(0, |rows, _| rows >> 8 | pairs.next_negative());
+    let upper = four();
+    Shown([upper, if log2 == 2 { 0 } else { four() }])
 }
 
 /// Those of the pixels that `shown` names whose texels the mask has.

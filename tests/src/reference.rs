@@ -6,7 +6,7 @@ use cubist_baker::encode::unpacked;
 use cubist_core::Bundle;
 use cubist_core::coder::{Decoder, Probability};
 use cubist_core::fixed::{ONE, PlayUv};
-use cubist_core::format::{MASKED, SPACE_CUBIC, STRIP, TIME_CUBIC, TIME_HOLD, TIME_LINEAR, TexelKind};
+use cubist_core::format::{LabelRecord, MASKED, SPACE_CUBIC, STRIP, TIME_CUBIC, TIME_HOLD, TIME_LINEAR, TexelKind};
 use cubist_core::grid::Grid;
 use cubist_core::key::{self, Chain, Key, Nothing};
 use cubist_core::lists::{self, CHART, FIELD, Lists};
@@ -89,7 +89,13 @@ pub struct Pixel {
     pub outline: f64,
     /// How far such a field goes from key to key at any corner, pixels.
     pub shift: f64,
+    /// How far from any edge of a chart that runs through the cell a corner is at most, texels, and how far from zero such a field is there, pixels.
+    pub reach: [f64; 2],
 }
+
+/// What telling signs by pairs of numbers can be off by, of how far from zero they are at most: half a unit of 2^-13 for a number and for its steps, those
+/// down and across times four, how they change times sixteen, how they bend times six each, and a unit for the other half of a word.
+pub const PAIRS: f64 = (0.5 * 37.0 + 1.0) / 8192.0;
 
 /// All keys of a bundle, decoded.
 pub struct Reference<'a> {
@@ -280,6 +286,7 @@ impl<'a> Reference<'a> {
     fn pixel(&self, sheets: &[Sheet], within: [f64; 2]) -> Option<Pixel> {
         let size = self.size();
         let (mut motion, mut margin, mut outline, mut shift) = (0.0f64, f64::INFINITY, f64::INFINITY, 0.0f64);
+        let mut reach = [0.0f64; 2];
         for (index, sheet) in sheets.iter().enumerate() {
             let at = sheet.position.map(|of| of.at(within));
             let last = index + 1 == sheets.len();
@@ -290,16 +297,21 @@ impl<'a> Reference<'a> {
                 let least = if strip { a.min(b) } else { a };
                 (outline, shift) = (outline.min(least.abs()), shift.max(sheet.shift));
                 shows &= least > 0.0;
+                reach[1] = sheet.fields[..if strip { 2 } else { 1 }].iter().map(|field| field.reach(0.0)).fold(reach[1], f64::max);
             }
             if !last && sheet.test != FIELD {
                 shows &= self.covers(sheet.label, at);
+                let LabelRecord { left, top, right, bottom, .. } = self.bundle.label(sheet.label);
+                let edges = sheet.position.iter().zip([[left, right], [top, bottom]]);
+                let edges = edges.flat_map(|(of, edges)| edges.map(|edge| (of, f64::from(edge))));
+                reach[0] = edges.filter(|(of, edge)| of.runs_through(*edge)).map(|(of, edge)| of.reach(edge)).fold(reach[0], f64::max);
             }
             motion = motion.max(sheet.motion);
             // Outside the picture no edge is nearer than the picture's own.
             margin = at.iter().zip(size).map(|(x, size)| (x - x.round().clamp(0.0, size)).abs()).fold(margin, f64::min);
             if last || shows {
                 let at = [0, 1].map(|axis: usize| at[axis].clamp(0.0, size[axis] - EDGE));
-                return Some(Pixel { label: sheet.label, at, colour: self.colour(at), motion, margin, outline, shift });
+                return Some(Pixel { label: sheet.label, at, colour: self.colour(at), motion, margin, outline, shift, reach });
             }
         }
         None
@@ -398,6 +410,17 @@ impl Patch {
         let [a, b, c, d] = self.corners;
         let (left, right) = (a + (c - a) * y, b + (d - b) * y);
         left + (right - left) * x + self.across / 2.0 * x * (x - 1.0) + self.down / 2.0 * y * (y - 1.0)
+    }
+
+    /// How far it is from `value` at most: in a corner, or where it bulges between them.
+    fn reach(&self, value: f64) -> f64 {
+        self.corners.iter().map(|corner| (corner - value).abs()).fold(0.0, f64::max) + (self.across.abs() + self.down.abs()) / 8.0
+    }
+
+    /// Whether it may be on either side of `value`.
+    fn runs_through(&self, value: f64) -> bool {
+        let bulge = (self.across.abs() + self.down.abs()) / 8.0;
+        self.corners.iter().any(|&corner| corner <= value + bulge) && self.corners.iter().any(|&corner| corner >= value - bulge)
     }
 }
 

@@ -78,8 +78,11 @@ fn main() -> Result<()> {
             let mut all = read(results)?;
             let scenes = all.get_mut(target).and_then(|scenes| scenes.get_mut(scene));
             let Some(Measured::Instructions(plain)) = scenes else { bail!("{results}: {scene} is to be played on {target} first") };
-            plain.other_rows.insert(kind.to_owned(), figures::OtherRows::from(&found));
+            let rows = figures::OtherRows::from(&found);
+            let checked = limits::check(Path::new("limits.json"), target, &format!("{scene}, {kind} rows"), &rows);
+            plain.other_rows.insert(kind.to_owned(), rows);
             write_all(&all, results, readme)?;
+            checked?;
         }
         _ => bail!(
             "usage: cubist-mcu TARGET SCENE FIRMWARE BUNDLE CODE_BYTES RESULTS README\n       cubist-mcu rp2040 SCENE FIRMWARE BUNDLE CODE_BYTES RAM_BYTES DISPLAY EMULATOR RESULTS README\n       cubist-mcu rows KIND TARGET SCENE FIRMWARE BUNDLE CODE_BYTES RESULTS README\n       cubist-mcu sizes TARGET README NAME:SPEED:SIZE...\n       cubist-mcu frames BUNDLE OUT\n       cubist-mcu card WIDTHxHEIGHT OUT"
