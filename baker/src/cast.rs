@@ -1,7 +1,6 @@
 //! What is cast once for a scene, whatever charts, source images and keys are tried: the rays through all pixels of all frames, and those between them.
 //! Scenes come from `job` and the searches; hits go to charting and painting, what lies between them to `tears`.
 
-use crate::bake::Progress;
 use crate::gbuffer::Hits;
 use crate::scene::Scene;
 use crate::trace::Tracer;
@@ -19,9 +18,9 @@ pub struct Cast<'a> {
 }
 
 impl<'a> Cast<'a> {
-    /// Casts the rays of all frames.
+    /// Casts the rays of all frames; `progress` hears what is done, and how much of it, 0..=1.
     #[must_use]
-    pub fn new(scene: &'a Scene, progress: Progress<'_>) -> Self {
+    pub fn new(scene: &'a Scene, progress: &(dyn Fn(&str, f64) + Sync)) -> Self {
         let start = Instant::now();
         progress("building the hierarchy", 0.0);
         let tracer = Tracer::new(scene);

@@ -272,11 +272,12 @@ mod tests {
             let corners = [(); 4].map(|()| next(size));
             let form = Form::new(corners, [next(bent + 1), next(bent + 1)], 3);
             let places = || (0..8).flat_map(|y| (0..8).map(move |x| [x, y]));
-            let reach = places().map(|at| form.at(at).unsigned_abs()).max().unwrap();
+            let reach = places().fold(0, |reach, at| form.at(at).unsigned_abs().max(reach));
             let mut pairs = form.pairs(reach);
-            let rows = [(); 8].map(|()| pairs.next_negative());
+            let mut row = 0;
             for [x, y] in places() {
-                let (number, told) = (form.at([x, y]), rows[y as usize] >> (24 + x) & 1 == 1);
+                row = if x == 0 { pairs.next_negative() } else { row };
+                let (number, told) = (form.at([x, y]), row >> (24 + x) & 1 == 1);
                 // Half a unit for each number rounded, times how often it counts, and a unit for the other half of the word.
                 assert!(told == (number < 0) || number.unsigned_abs() <= 40 * (reach >> 13) + 40, "{form:?} {reach} {x} {y} {number}");
                 (wrong, below, all) = (wrong + u32::from(told != (number < 0)), below + u32::from(told), all + 1);
