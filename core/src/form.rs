@@ -219,13 +219,17 @@ impl Pairs {
 mod tests {
     use super::Form;
 
+    /// Numbers around zero, below half of what is asked for either way.
+    fn random(mut seed: u32) -> impl FnMut(u32) -> i32 {
+        move |below| {
+            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            ((u64::from(seed).wrapping_mul(below.into()) >> 32) as i32).wrapping_sub((below / 2) as i32)
+        }
+    }
+
     #[test]
     fn forms_go_through_their_corners_and_are_what_their_formula_says() {
-        let mut seed = 5u32;
-        let mut next = |below: u32| {
-            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            ((u64::from(seed) * u64::from(below)) >> 32) as i32 - (below / 2) as i32
-        };
+        let mut next = random(5);
         for log2 in 2..=5 {
             let n = 1u32 << log2;
             for _ in 0..500 {
@@ -261,11 +265,7 @@ mod tests {
 
     #[test]
     fn pairs_tell_signs_but_where_a_number_is_next_to_nothing() {
-        let mut seed = 7u32;
-        let mut next = |below: u32| {
-            seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            ((u64::from(seed) * u64::from(below)) >> 32) as i32 - (below / 2) as i32
-        };
+        let mut next = random(7);
         let (mut wrong, mut below, mut all) = (0, 0, 0);
         for round in 0..4000u32 {
             let (size, bent) = (1 << (10 + round % 16), if round % 3 == 0 { 0 } else { 1 << (8 + round % 14) });

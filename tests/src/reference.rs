@@ -414,12 +414,17 @@ impl Patch {
 
     /// How far it is from `value` at most: in a corner, or where it bulges between them.
     fn reach(&self, value: f64) -> f64 {
-        self.corners.iter().map(|corner| (corner - value).abs()).fold(0.0, f64::max) + (self.across.abs() + self.down.abs()) / 8.0
+        self.corners.iter().map(|corner| (corner - value).abs()).fold(0.0, f64::max) + self.bulge()
+    }
+
+    /// How far it goes beyond what its corners have, at most.
+    fn bulge(&self) -> f64 {
+        (self.across.abs() + self.down.abs()) / 8.0
     }
 
     /// Whether it may be on either side of `value`.
     fn runs_through(&self, value: f64) -> bool {
-        let bulge = (self.across.abs() + self.down.abs()) / 8.0;
+        let bulge = self.bulge();
         self.corners.iter().any(|&corner| corner <= value + bulge) && self.corners.iter().any(|&corner| corner >= value - bulge)
     }
 }
