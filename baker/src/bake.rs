@@ -282,12 +282,11 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let (planes, cameras) = planes::records(&charts, &layers.by_label(image.labels.len()), &lenses, &grid);
     let content =
         Content { grid: &grid, image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields, planes: &planes, cameras: &cameras };
-    let code =
-        |lambda| -> Result<Vec<u8>, BakeError> { Ok(encode::bundle(&content, CodingSettings { lambda, ..settings.coding }, header)?) };
+    let code = |coding: CodingSettings| -> Result<Vec<u8>, BakeError> { Ok(encode::bundle(&content, coding, header)?) };
     let bundle = match settings.sparing {
-        Sparing::Nothing => code(settings.coding.lambda)?,
-        Sparing::Unseen => spare::unseen(&flat.atlas, encode::image_bytes(image, settings.atlas.storage), code)?,
-        Sparing::Within(bytes) => spare::within(bytes, code)?,
+        Sparing::Nothing => code(settings.coding)?,
+        Sparing::Unseen => spare::unseen(&flat.atlas, encode::image_bytes(image, settings.atlas.storage), settings.coding, code)?,
+        Sparing::Within(bytes) => spare::within(bytes, |lambda| code(CodingSettings { lambda, ..settings.coding }))?,
     };
     progress("coding keys", 1.0);
     Ok(Encoded { bundle, grid, dropped_pixels: sheets.dropped, torn_by_cause, seconds: start.elapsed().as_secs_f64() })

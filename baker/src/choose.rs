@@ -94,6 +94,7 @@ fn halved(scene: &Scene, settings: &Settings) -> (Scene, Settings) {
         (play.width, play.height) = (play.width / 2, play.height / 2);
     }
     (settings.atlas.storage, settings.sparing) = (Storage::Packed, Sparing::Nothing);
+    settings.atlas.outline = settings.atlas.outline.or(Some(0));
     // All frames are meant.
     settings.atlas.detail *= (f64::from(scene.playback.frames) + LONGER) / (f64::from(play.frames) + LONGER);
     (small, settings)

@@ -5,6 +5,17 @@ use crate::made::Made;
 use crate::metrics;
 use crate::scene::Scene;
 
+/// `made`, or what is made of the scene in the same cells with all sheets, or without those that take more than they are worth there, if that is worth more.
+///
+/// # Errors
+/// Those of encoding, and of the player.
+pub(crate) fn anew(scene: &Scene, flat: &Flat, made: Made, progress: Progress<'_>) -> Result<Made, BakeError> {
+    let all = Made::new(scene, flat, Settings { error: 0.0, ..made.settings })?;
+    let picture = made.picture(flat);
+    let other = choose(scene, flat, all, progress)?;
+    Ok(if other.worth(picture) > made.worth(picture) { other } else { made })
+}
+
 /// `all`, or what is made of the scene without the sheets that take more than they are worth at the quality of `all`, if that is worth more.
 ///
 /// # Errors

@@ -51,6 +51,11 @@ impl Other {
     }
 }
 
+/// Whether so many outlines cross cells that sheets are given up, for else surfaces go on as they should: on rough land they do not.
+pub(crate) fn crossed(quality: &Brief) -> bool {
+    quality.wrong_surface_percent >= TORN && quality.path_error_texels.p99 < BENT
+}
+
 /// Steps to climb by, and how many tries they get.
 type Climb = (&'static [Step], usize);
 

@@ -1,10 +1,11 @@
 //! Inspection: what a bundle holds, byte by section.
 //! Bytes come from a file or the encoder; figures go to `cubist-bake inspect` and to the report's byte counts.
 
-use crate::encode::unpacked;
+use crate::encode::{Unpacked, unpacked};
 use cubist_core::format::{
     ATLAS, FIXED, INFO, LABELS, MASK, MASKED, PATH, SPACE_LINEAR, STRIP, TIME_HOLD, TIME_LINEAR, TexelKind, VERSION,
 };
+use cubist_core::mask::Tile;
 use cubist_core::plane::Plane;
 use cubist_core::{Bundle, BundleError};
 use serde::Serialize;
@@ -117,8 +118,33 @@ pub struct ImageInfo {
     pub raw_bytes: usize,
     /// Palette entries; 0 where texels are colours themselves.
     pub colours: usize,
-    /// Texels that belong to a chart; `None`: no label is masked.
-    pub covered_texels: Option<u64>,
+    /// What of it belongs to a chart; `None`: no label is masked.
+    pub mask: Option<MaskInfo>,
+}
+
+/// A mask.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+pub struct MaskInfo {
+    /// Bits a texel in each direction.
+    pub bits_a_texel: u32,
+    /// Tiles of 8 x 8 bits.
+    pub tiles: usize,
+    /// Different ones.
+    pub blocks: usize,
+    /// What belongs to a chart, texels.
+    pub covered_texels: u64,
+}
+
+impl MaskInfo {
+    fn new(image: &Unpacked) -> Self {
+        let bits = |tile: &Tile| {
+            image.blocks.get(usize::from(u16::from_le_bytes(*tile))).map_or(0, |&block| u64::from_le_bytes(block).count_ones())
+        };
+        let covered: u64 = image.tiles.iter().map(|tile| u64::from(bits(tile))).sum();
+        let bits_a_texel = 1u32 << image.shape.finer;
+        let covered_texels = covered / u64::from(bits_a_texel * bits_a_texel);
+        Self { bits_a_texel, tiles: image.tiles.len(), blocks: image.blocks.len(), covered_texels }
+    }
 }
 
 /// The bounds that a bundle states.
@@ -184,7 +210,7 @@ fn holds(tag: [u8; 4]) -> &'static str {
         PATH => "camera path: header, key table, key records",
         ATLAS => "source image: palette, texels",
         LABELS => "labels: a rectangle of the source image each",
-        MASK => "mask: one bit a texel, is it part of its chart",
+        MASK => "mask: what is part of its chart",
         INFO => "a text for people",
         _ => "unknown to this version",
     }
@@ -212,9 +238,9 @@ impl Inspection {
         let (path, atlas) = (bundle.path(), bundle.atlas());
         let (width, height) = bundle.size();
         let cell = 1u32 << path.cell_log2;
-        let (texels, mask) = unpacked(&bundle);
-        let raw_bytes = texels.len() + mask.len();
-        let covered = bundle.masked().then(|| mask.iter().map(|byte| u64::from(byte.count_ones())).sum());
+        let image = unpacked(&bundle);
+        let raw_bytes = image.bytes();
+        let mask = bundle.masked().then(|| MaskInfo::new(&image));
         let limits = bundle.limits();
         Ok(Self {
             version: VERSION,
@@ -258,7 +284,7 @@ impl Inspection {
                 stored_bytes: bundle.packed().map_or(raw_bytes, <[u8]>::len),
                 raw_bytes,
                 colours: atlas.palette.len() / 2,
-                covered_texels: covered,
+                mask,
             },
             palette: atlas.palette.as_chunks::<2>().0.iter().map(|&colour| hex(u16::from_le_bytes(colour))).collect(),
             labels: (0..bundle.label_count()).map(|label| label_info(&bundle, label as u8)).collect(),
@@ -350,11 +376,16 @@ impl Inspection {
             line(format!("      plane of label {label:>3}  {origin} + u {u} + v {v}; u, v in 1/{} texel", 1u64 << shift.min(63)));
         }
         let image = &self.image;
-        let covered = image
-            .covered_texels
-            .map_or_else(|| "all".to_owned(), |n| format!("{n}, {:.1} %", 100.0 * n as f64 / f64::from(image.size[0] * image.size[1])));
+        let texels = f64::from(image.size[0] * image.size[1]);
+        let covered = image.mask.map_or_else(
+            || "all".to_owned(),
+            |mask| format!("{}, {:.1} %", mask.covered_texels, 100.0 * mask.covered_texels as f64 / texels),
+        );
         line(format!("ATLS  {} x {} texels, {}; covered: {covered}", image.size[0], image.size[1], image.texel()));
         line(format!("      {}", image.storage()));
+        if let Some(MaskInfo { bits_a_texel: bits, tiles, blocks, .. }) = image.mask {
+            line(format!("      mask: {bits} x {bits} bits a texel; {blocks} different blocks in {tiles} tiles of 8 x 8 bits"));
+        }
         for (index, row) in self.palette.chunks(12).enumerate() {
             line(format!("      colours from {:>3}  {}", index * 12, row.join(" ")));
         }

@@ -10,6 +10,7 @@ use crate::fewer;
 use crate::finer;
 use crate::inspect::Inspection;
 use crate::made::Made;
+use crate::outlines;
 use crate::repaint::Painter;
 use crate::report::{Origin, Report, Seconds};
 use crate::scene::Scene;
@@ -213,6 +214,9 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
         }
         whole = Some(Whole { settings: baked.settings, memory, psnr: baked.report.quality.psnr_mean });
     }
+    // What outlines need of it, flash has.
+    let outline = whole.map_or(options.source.outline, |whole| whole.settings.atlas.outline);
+    let options = &Options { source: atlas::Settings { outline, ..options.source }, ..*options };
     let choice_seconds = start.elapsed().as_secs_f64();
     let settings = options.settings(scene.playback.width);
     let cast = Cast::new(scene, progress);
@@ -233,14 +237,18 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
     let finer_start = Instant::now();
     let quality = verify::briefly(&encoded.bundle, &flat.atlas.image, &flat.atlas.gbuffer)?;
     let free = options.goal == Goal::AsSet && options.cell.is_none() && options.key_interval.is_none();
-    let all = quality;
     let made = Made { settings, encoded, quality };
+    let sharp = options.goal == Goal::AsSet;
+    let (made, outlines) = if sharp { outlines::choose(scene, &mut flat, made, progress)? } else { (made, Vec::new()) };
+    let all = made.quality;
     // Searches have left out what they could.
     let prunes = !options.all_sheets && options.goal == Goal::AsSet;
     let made = if prunes { fewer::choose(scene, &flat, made, progress)? } else { made };
     let (made, other) = if free { finer::choose(scene, &flat, made, &all, progress)? } else { (made, None) };
     let bends = options.goal == Goal::AsSet && options.space.is_none();
-    let (mut made, spaces) = if bends { straight::choose(scene, &flat, made, progress)? } else { (made, Vec::new()) };
+    let (made, spaces) = if bends { straight::choose(scene, &flat, made, progress)? } else { (made, Vec::new()) };
+    // In other cells what a sheet has to save is another thing.
+    let mut made = if prunes && other.is_some() { fewer::anew(scene, &flat, made, progress)? } else { made };
     let finer = other.map(|other| other.said(&made));
     let (search_seconds, paint_start) = (search_seconds + finer_start.elapsed().as_secs_f64(), Instant::now());
     let repainted = painter.map_or(Ok(false), |painter| painter.repaint(&mut made, &mut flat.atlas, options.goal))?;
@@ -273,7 +281,7 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
         verify: verify_start.elapsed().as_secs_f64(),
         search: choice_seconds + search_seconds,
     };
-    let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings, spaces, repainted };
+    let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings, spaces, outlines, repainted };
     let mut report = Report::new(&origin, &inspection, quality, truth, work, seconds);
     report.warnings.extend(warnings.into_iter().chain(finer));
     Ok(Baked { bundle: encoded.bundle, report, flat, settings })

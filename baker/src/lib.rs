@@ -27,6 +27,7 @@ mod joins;
 mod made;
 pub mod metrics;
 pub mod order;
+pub mod outlines;
 pub mod patch;
 pub mod planes;
 pub mod polish;

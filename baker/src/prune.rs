@@ -184,7 +184,7 @@ impl Users {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::atlas::Label;
+    use crate::atlas::{Label, Outline};
     use cubist_core::format::{SPACE_LINEAR, TIME_LINEAR, TexelKind};
 
     /// A screen of four cells of 8 x 8 pixels, two frames: chart 1 everywhere but in a line along the top of the first cell, which shows chart 2.
@@ -209,6 +209,7 @@ mod tests {
             texels: (0..64 * 16).map(|at| u16::from(at % 64 >= 20)).collect(),
             palette: greys.map(|grey| [grey; 3]).to_vec(),
             covered: vec![true; 64 * 16],
+            outline: Outline { finer: 0, bits: vec![true; 64 * 16] },
             labels: vec![label([60, 0, 64, 4]), label([0, 0, 16, 16]), label([20, 0, 28, 8])],
         }
     }

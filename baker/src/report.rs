@@ -6,6 +6,7 @@ use crate::bake::{Encoded, Flat, Settings};
 use crate::causes::Causes;
 use crate::chart::{self, Family, Trial};
 use crate::inspect::{Inspection, space_name, time_name};
+use crate::outlines;
 use crate::scene::Scene;
 use crate::straight;
 use crate::verify::{Quality, TruthQuality, Work};
@@ -136,6 +137,17 @@ pub struct Source {
     pub scale: f64,
     /// Texels between charts.
     pub gutter: u32,
+    /// Bits of the outline a texel, in each direction.
+    #[serde(default = "whole")]
+    pub outline: u32,
+    /// Outlines that were tried; empty where none were.
+    #[serde(default)]
+    pub outlines: Vec<outlines::Trial>,
+}
+
+/// What outlines had before they could be finer.
+const fn whole() -> u32 {
+    1
 }
 
 /// The report; its keys keep their names and meaning.
@@ -187,6 +199,8 @@ pub(crate) struct Origin<'a> {
     pub settings: &'a Settings,
     /// Kinds of space that were tried.
     pub spaces: Vec<straight::Trial>,
+    /// Outlines that were tried.
+    pub outlines: Vec<outlines::Trial>,
     /// Texels were coloured by the pixels that show them.
     pub repainted: bool,
 }
@@ -244,6 +258,8 @@ impl Report {
                 detail: Some(settings.atlas.detail).filter(|detail| detail.is_finite()),
                 scale: figures.scale,
                 gutter: figures.gutter,
+                outline: image.outline.bits_a_texel(),
+                outlines: origin.outlines.clone(),
             },
             bytes: Bytes {
                 bundle: inspection.bytes,
@@ -388,6 +404,9 @@ pub fn table(report: &Report) -> Vec<(String, String)> {
         ),
     );
     row("labels, mask", format!("{} bytes: {} labels for {} charts", grouped(bytes.labels + bytes.mask), image.labels, image.charts));
+    if !image.outlines.is_empty() {
+        row("", outlines::reason(&image.outlines));
+    }
     row("", chart::reason(image.candidate, image.rewarped, image.trials.iter()));
     row("keys", format!("{} bytes: {:.1} a frame", grouped(bytes.keys), bytes.keys_per_frame));
     row("bundle", format!("{} bytes: {:.1} a frame", grouped(bytes.bundle), bytes.per_frame));

@@ -4,42 +4,67 @@
 
 use crate::atlas::Atlas;
 use crate::climb::LAMBDAS;
+use crate::encode::CodingSettings;
 use crate::metrics;
 use crate::truth::spread;
 use crate::verify::{self, VerifyError};
 
-/// What a bit is worth at first, and then, finest first.
+/// What a bit is worth at first.
 const FINEST: f32 = 0.01;
-const COARSER: [f32; 3] = [0.05, 0.2, 1.0];
+/// What it is worth then, finest first.
+const LAMBDAS_UP: [Coarser; 3] = [Coarser::Lambda(0.05), Coarser::Lambda(0.2), Coarser::Lambda(1.0)];
+/// Steps that positions are coded in after that: twice to eight times what they are stored in.
+const STEPS_UP: [Coarser; 3] = [Coarser::Step(1), Coarser::Step(2), Coarser::Step(3)];
 /// Frames compared.
 const COMPARED: u32 = 16;
 /// What twice the bytes of a bundle's keys have to bring, dB against exact rays.
 pub(crate) const DOUBLE: f64 = 1.55;
 
-/// The bundle among those that `code` makes, at what a bit is worth, that is worth most; `picture`: bytes that are not keys. Stops where coarser
-/// is no better.
+/// A way to code coarser.
+#[derive(Clone, Copy)]
+enum Coarser {
+    /// By what a bit is worth.
+    Lambda(f32),
+    /// By steps of 2^this.
+    Step(u8),
+}
+
+impl Coarser {
+    const fn than(self, coding: CodingSettings) -> CodingSettings {
+        match self {
+            Self::Lambda(lambda) => CodingSettings { lambda, ..coding },
+            Self::Step(step_log2) => CodingSettings { step_log2, ..coding },
+        }
+    }
+}
+
+/// The bundle among those that `code` makes, of settings as coarse as `finest` or coarser, that is worth most; `picture`: bytes that are not keys. What a
+/// bit is worth grows first, then the steps that positions are coded in, each as long as coarser is better.
 ///
 /// # Errors
 /// Those of `code`, and [`VerifyError`] where the player refuses a bundle.
-pub(crate) fn unseen<E: From<VerifyError>>(atlas: &Atlas, picture: usize, code: impl Fn(f32) -> Result<Vec<u8>, E>) -> Result<Vec<u8>, E> {
+pub(crate) fn unseen<E: From<VerifyError>>(
+    atlas: &Atlas,
+    picture: usize,
+    finest: CodingSettings,
+    code: impl Fn(CodingSettings) -> Result<Vec<u8>, E>,
+) -> Result<Vec<u8>, E> {
     let frames = spread(atlas.gbuffer.frames, COMPARED);
-    let exact: Vec<Vec<u8>> = frames.iter().map(|&frame| verify::exact_frame(atlas, frame)).collect();
-    let measured = |lambda| -> Result<(f64, Vec<u8>), E> {
-        let bundle = code(lambda)?;
-        let (mut psnr, mut rest) = (0.0, exact.iter());
-        verify::play(&bundle, &frames, |_, played| {
-            psnr += rest.next().map_or(0.0, |exact| metrics::psnr(metrics::mean_squared_error(played, exact)));
-        })?;
+    let exact: Vec<(u32, Vec<u8>)> = frames.into_iter().map(|frame| (frame, verify::exact_frame(atlas, frame))).collect();
+    let measured = |coding: CodingSettings| -> Result<(f64, Vec<u8>, CodingSettings), E> {
+        let bundle = code(coding)?;
         let keys = bundle.len().saturating_sub(picture) as u64;
-        Ok((metrics::worth(psnr / frames.len().max(1) as f64, keys, DOUBLE), bundle))
+        Ok((metrics::worth(verify::against_pictures(&bundle, &exact)?, keys, DOUBLE), bundle, coding))
     };
-    let mut best = measured(FINEST)?;
-    for lambda in COARSER {
-        let next = measured(lambda)?;
-        if next.0 <= best.0 {
-            break;
+    let mut best = measured(CodingSettings { lambda: FINEST, ..finest })?;
+    for ladder in [LAMBDAS_UP, STEPS_UP] {
+        for coarser in ladder {
+            let next = measured(coarser.than(best.2))?;
+            if next.0 <= best.0 {
+                break;
+            }
+            best = next;
         }
-        best = next;
     }
     Ok(best.1)
 }

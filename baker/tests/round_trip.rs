@@ -1,6 +1,6 @@
 //! From a G-buffer to bytes to pixels: two sheets, one moving in front of the other.
 
-use cubist_baker::atlas::{Label, SourceImage, Storage};
+use cubist_baker::atlas::{Label, Outline, SourceImage, Storage};
 use cubist_baker::bake::Coverage;
 use cubist_baker::encode::{self, CodingSettings, Content, Exceeded, Header};
 use cubist_baker::gbuffer::GBuffer;
@@ -22,8 +22,9 @@ fn gbuffer(looping: bool) -> (GBuffer, SourceImage) {
     ];
     let texels = (0..width * height).map(|i| u16::from(((i % width) * 7 + (i / width) * 13) as u8)).collect();
     let palette = (0..=255u8).map(|i| [i & 0xf8, i & 0xfc, (i << 3) & 0xf8]).collect();
-    let image =
-        SourceImage { width, height, kind: TexelKind::Indexed8, texels, palette, covered: vec![true; (width * height) as usize], labels };
+    let covered = vec![true; (width * height) as usize];
+    let outline = Outline { finer: 0, bits: covered.clone() };
+    let image = SourceImage { width, height, kind: TexelKind::Indexed8, texels, palette, covered, outline, labels };
     let mut gbuffer = GBuffer { width: SIZE[0], height: SIZE[1], frames: FRAMES, label: Vec::new(), uv: Default::default() };
     let mut places = Vec::new();
     for frame in 0..FRAMES {

@@ -1,15 +1,16 @@
-//! The source image at playback: texels by position, and whether a texel belongs to its chart.
+//! The source image at playback: texels by position, and what belongs to a chart.
 //! Borrowed from the bundle or unpacked by `pack`; read by `coverage`, `filter` and `texels`.
 
 use crate::fixed::{PLAY_BITS, PlayUv};
+use crate::mask::Mask;
 
-/// The colour plane and the mask.
+/// Texels and the mask.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Texture<'a> {
     /// Texels of the bundle's [`crate::format::TexelKind`], row by row.
     pub texels: &'a [u8],
-    /// One bit a texel, least significant first; empty where no label is masked.
-    pub mask: &'a [u8],
+    /// What of it belongs to a chart; empty where no label is masked.
+    pub mask: Mask<'a>,
     /// A row is 2^this texels.
     pub width_log2: u32,
     /// Rows.
@@ -21,13 +22,6 @@ impl Texture<'_> {
     #[must_use]
     pub const fn index(&self, uv: PlayUv) -> usize {
         ((uv.v >> PLAY_BITS << self.width_log2) | (uv.u >> PLAY_BITS)) as u32 as usize
-    }
-
-    /// Whether the texel at `uv` belongs to a chart.
-    #[must_use]
-    pub fn covered(&self, uv: PlayUv) -> bool {
-        let index = self.index(uv);
-        self.mask.get(index >> 3).is_some_and(|byte| byte >> (index & 7) & 1 == 1)
     }
 
     /// Whether `uv` lies inside the picture.

@@ -6,9 +6,10 @@ use crate::atlas::Texture;
 use crate::fixed::KEY_BITS;
 use crate::format::{
     self, ATLAS, Atlas, Envelope, INFO, KEY_BYTES, KNOWN_FLAGS, KeyEntry, LABEL_BYTES, LABELS, LabelRecord, MAGIC, MASK, MASKED,
-    MAX_SECTIONS, MAX_SHEETS, PACKED, PATH, Path, SPACE_CUBIC, Section, TIME_CUBIC, TexelKind, VERSION,
+    MAX_SECTIONS, MAX_SHEETS, MOST_BLOCKS, MOST_FINER, PACKED, PATH, Path, SPACE_CUBIC, Section, TIME_CUBIC, TexelKind, VERSION,
 };
 use crate::grid::Grid;
+use crate::mask::{Block, Mask, PLAIN, Shape, Tile};
 use crate::plane::{CAMERA_BYTES, Camera, PLANE_BYTES};
 use heapless::Vec;
 
@@ -19,7 +20,7 @@ pub struct Bundle<'a> {
     path: Path<'a>,
     atlas: Atlas<'a>,
     labels: &'a [[u8; LABEL_BYTES]],
-    mask: &'a [u8],
+    mask: Mask<'a>,
     keys: &'a [[u8; KEY_BYTES]],
     planes: &'a [[u8; PLANE_BYTES]],
     cameras: &'a [[u8; CAMERA_BYTES]],
@@ -189,6 +190,18 @@ impl<'a> Bundle<'a> {
         self.labels.iter().any(|label| LabelRecord::from_bytes(label).flags & MASKED != 0)
     }
 
+    /// The mask as far as it is borrowed: where the source image is packed, its size alone.
+    #[must_use]
+    pub fn mask(&self) -> Mask<'a> {
+        self.mask
+    }
+
+    /// Different blocks of the mask; 0: there is none.
+    #[must_use]
+    pub fn mask_blocks(&self) -> usize {
+        if self.masked() { self.atlas.blocks as usize } else { 0 }
+    }
+
     /// The coded mask and texels of a bundle that holds them packed; `None`: they are raw.
     #[must_use]
     pub fn packed(&self) -> Option<&'a [u8]> {
@@ -242,7 +255,7 @@ fn check_atlas(atlas: &Atlas<'_>) -> Result<(), BundleError> {
     field(some && atlas.palette.len().is_multiple_of(2), "ATLS palette bytes", atlas.palette.len() as u32)
 }
 
-fn check_labels<'a>(labels: &[[u8; LABEL_BYTES]], atlas: &Atlas<'_>, mask: &'a [u8]) -> Result<&'a [u8], BundleError> {
+fn check_labels<'a>(labels: &[[u8; LABEL_BYTES]], atlas: &Atlas<'_>, mask: &'a [u8]) -> Result<Mask<'a>, BundleError> {
     let mut masked = false;
     for (index, bytes) in labels.iter().enumerate() {
         let label = LabelRecord::from_bytes(bytes);
@@ -254,11 +267,21 @@ fn check_labels<'a>(labels: &[[u8; LABEL_BYTES]], atlas: &Atlas<'_>, mask: &'a [
         field(!label.fixed() || index == 0 && label.flags & MASKED == 0, "LABL flags", u32::from(label.flags))?;
     }
     // A packed picture brings its mask along.
-    if !masked || packs(atlas) {
-        return Ok(&[]);
+    let width_log2 = atlas.width_log2.into();
+    if !masked {
+        return Ok(Mask { shape: Shape { width_log2, height: atlas.height.into(), finer: 0 }, ..Mask::default() });
     }
-    length((usize::from(atlas.height) << atlas.width_log2) / 8, mask.len(), "MASK")?;
-    Ok(mask)
+    field(atlas.finer <= MOST_FINER, "ATLS finer", u32::from(atlas.finer))?;
+    field((PLAIN.len() as u32..=MOST_BLOCKS).contains(&atlas.blocks), "ATLS blocks", atlas.blocks)?;
+    let shape = Shape { width_log2, height: atlas.height.into(), finer: atlas.finer.into() };
+    // A packed picture brings its mask along.
+    if packs(atlas) {
+        return Ok(Mask { shape, ..Mask::default() });
+    }
+    let tiles = shape.tiles().saturating_mul(size_of::<Tile>());
+    length(tiles.saturating_add((atlas.blocks as usize).saturating_mul(size_of::<Block>())), mask.len(), "MASK")?;
+    let (tiles, blocks) = mask.split_at_checked(tiles).unwrap_or_default();
+    Ok(Mask { tiles: tiles.as_chunks().0, blocks: blocks.as_chunks().0, shape })
 }
 
 fn check_path<'a>(path: &Path<'a>) -> Result<&'a [[u8; KEY_BYTES]], BundleError> {

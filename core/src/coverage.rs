@@ -73,7 +73,7 @@ impl Chart {
     #[inline]
     pub fn covers(&self, uv: PlayUv, texture: &Texture<'_>) -> bool {
         let inside = uv.u >= self.left && uv.u < self.right && uv.v >= self.top && uv.v < self.bottom;
-        inside && (!self.masked() || texture.covered(uv))
+        inside && (!self.masked() || texture.mask.covers(uv))
     }
 
     /// How much the chart covers of what lies within `bounds`, with some room for rounding.
@@ -90,7 +90,7 @@ impl Chart {
         let (left, right) = (left.wrapping_add(TWICE), right.wrapping_sub(TWICE));
         let (top, bottom) = (top.wrapping_add(TWICE), bottom.wrapping_sub(TWICE));
         let all = low.u >= left && high.u < right && low.v >= top && high.v < bottom;
-        if all && (!self.masked() || filled(texture, &bounds.wider(PlayUv { u: SLACK, v: SLACK }))) { Cover::All } else { Cover::Part }
+        if all && (!self.masked() || texture.mask.fills(&bounds.wider(PlayUv { u: SLACK, v: SLACK }))) { Cover::All } else { Cover::Part }
     }
 
     /// Passes those of the rectangle's edges on that what lies within `bounds` may cross, each with what is said of its coordinate: u or v.
@@ -110,22 +110,6 @@ impl Chart {
             pass(v, Edge { at: self.bottom, ends: [low.v, high.v], upper: true });
         }
     }
-}
-
-/// Whether all texels within `bounds`, which lie inside the picture, are known to belong to a chart: not of more than 25 in a row.
-#[inline(never)]
-fn filled(texture: &Texture<'_>, &Bounds { low, high }: &Bounds) -> bool {
-    let (left, right) = ((low.u >> PLAY_BITS) as u32, (high.u >> PLAY_BITS) as u32);
-    let all = match right.wrapping_sub(left) {
-        more @ ..25 => u32::MAX >> 31u32.wrapping_sub(more),
-        _ => return false,
-    };
-    let mut rows = low.v >> PLAY_BITS..=high.v >> PLAY_BITS;
-    rows.all(|row| {
-        let index = (row as u32).wrapping_shl(texture.width_log2) | left;
-        let bits = texture.mask.get((index >> 3) as usize..).and_then(<[u8]>::first_chunk).copied();
-        bits.is_some_and(|bytes| !u32::from_le_bytes(bytes) >> (index & 7) & all == 0)
-    })
 }
 
 /// An upright rectangle of the source image.

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// What a bundle starts with.
 pub const MAGIC: [u8; 6] = *b"CUBIST";
 /// The format's version.
-pub const VERSION: u16 = 7;
+pub const VERSION: u16 = 8;
 /// The most sections a bundle can hold.
 pub const MAX_SECTIONS: usize = 16;
 /// The most sheets a cell can hold: the tests of all but the last fit into 16 bits.
@@ -21,7 +21,7 @@ pub const PATH: [u8; 4] = *b"PATH";
 pub const ATLAS: [u8; 4] = *b"ATLS";
 /// Tag of the section that holds one [`LabelRecord`] a label.
 pub const LABELS: [u8; 4] = *b"LABL";
-/// Tag of the section that holds one bit a texel: is it part of its chart? Present if a label is [`MASKED`].
+/// Tag of the section that holds the tiles and blocks of a [`crate::mask::Mask`]. Present if a label is [`MASKED`] and the source image is raw.
 pub const MASK: [u8; 4] = *b"MASK";
 /// Tag of the optional section that holds a UTF-8 text about the scene, for people.
 pub const INFO: [u8; 4] = *b"INFO";
@@ -110,6 +110,11 @@ impl TexelKind {
     }
 }
 
+/// The finest mask has 2^this bits a texel in each direction.
+pub const MOST_FINER: u8 = 2;
+/// The most blocks of a mask: numbers have 16 bits.
+pub const MOST_BLOCKS: u32 = 1 << 16;
+
 /// The source image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Atlas<'a> {
@@ -119,6 +124,11 @@ pub struct Atlas<'a> {
     pub height: u16,
     /// The [`TexelKind::encoding`], [`RAW`] or [`PACKED`].
     pub encoding: u8,
+    /// The mask has 2^this bits a texel in each direction, 0..=[`MOST_FINER`]; of no meaning where no label is [`MASKED`].
+    pub finer: u8,
+    /// Different blocks of the mask, the two [`crate::mask::PLAIN`] ones included, 2..=[`MOST_BLOCKS`]; of no meaning where
+    /// no label is [`MASKED`].
+    pub blocks: u32,
     /// RGB565, little-endian, at most [`TexelKind::colours`] entries.
     pub palette: &'a [u8],
     /// Row by row, from the top; packed: the coded mask and texels.

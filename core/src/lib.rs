@@ -105,6 +105,7 @@ mod graphics;
 pub mod grid;
 pub mod key;
 pub mod lists;
+pub mod mask;
 mod memory;
 pub mod nodes;
 pub mod pack;

@@ -9,6 +9,7 @@ use crate::filter;
 use crate::format::{self, LabelRecord, SPACE_CUBIC, TexelKind};
 use crate::key::{BACKDROP, Chain, Key};
 use crate::lists::{self, Lists};
+use crate::mask::{self, Block, Mask};
 use crate::nodes::{self, Layout};
 use crate::pack::{self, Picture, Recent, Scratch};
 use crate::plan::Plan;
@@ -89,7 +90,9 @@ fn picture<'m>(
     let Some(packed) = bundle.packed() else { return texture };
     let (kind, width_log2) = (bundle.texel_kind(), texture.width_log2);
     let texels = cutter.take(kind.bytes(bundle.texel_count()));
-    let mask = cutter.take(if bundle.masked() { bundle.texel_count() / 8 } else { 0 });
+    let mask = texture.mask;
+    let tiles = cutter.take::<mask::Tile>(if bundle.masked() { mask.shape.tiles() } else { 0 });
+    let blocks = cutter.take::<Block>(bundle.mask_blocks());
     // What unpacking needs lies where playback's own memory will.
     let mut rest = Cutter { rest: &mut *cutter.rest, words: cutter.words, unpacking: 0 };
     let scratch = Scratch {
@@ -98,8 +101,8 @@ fn picture<'m>(
         rows: rest.take(if kind == TexelKind::Indexed8 { 0 } else { pack::row_bytes(width_log2) }),
     };
     cutter.unpacking = rest.words;
-    unpack(&mut Decoder::new(packed), scratch, &mut Picture { width_log2, texels, mask });
-    Texture { texels, mask, ..texture }
+    unpack(&mut Decoder::new(packed), scratch, &mut Picture { shape: mask.shape, texels, tiles, blocks });
+    Texture { texels, mask: Mask { tiles, blocks, ..mask }, ..texture }
 }
 
 /// Cuts a workspace, or only counts what it would take, with a palette of so many `spread` colours.

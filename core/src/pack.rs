@@ -7,6 +7,8 @@
 //! That is said of bytes. Texels that are no bytes are coded as planes of them: see [`code_nibbles`] and [`code_direct`].
 
 use crate::coder::{Bits, Probability};
+use crate::fixed::{PLAY_BITS, PlayUv};
+use crate::mask::{BLOCK_LOG2, Block, Mask, PLAIN, Shape, Tile};
 use heapless::Vec;
 
 /// Texels that were last seen below one of a certain index, the latest first.
@@ -15,6 +17,8 @@ pub type Recent = [u8; WAYS];
 pub const WAYS: usize = 8;
 /// How many [`Recent`]s coding takes: one for every index.
 pub const INDICES: usize = 256;
+/// Texels of a row, at most.
+const WIDEST: usize = 1 << 10;
 /// Contexts that coding takes.
 pub const CONTEXTS: usize = SAME + AGAIN + SPELT;
 
@@ -45,12 +49,21 @@ pub struct Scratch<'s> {
 /// A picture as it is coded: an encoder finds here what to code, a decoder leaves here what it read.
 #[derive(Debug)]
 pub struct Picture<'p> {
-    /// A row is 2^this texels.
-    pub width_log2: u32,
+    /// Its size, and its mask's.
+    pub shape: Shape,
     /// Texels, row by row.
     pub texels: &'p mut [u8],
-    /// One bit a texel, least significant first: does it belong to a chart? Empty: all do.
-    pub mask: &'p mut [u8],
+    /// The mask's tiles, and its blocks in the order in which they first stand there, after the plain ones. Empty: all texels belong to a chart.
+    pub tiles: &'p mut [Tile],
+    /// Likewise.
+    pub blocks: &'p mut [Block],
+}
+
+impl<'p> Picture<'p> {
+    /// The texels, and the mask as it is.
+    fn parts(&mut self) -> (&mut [u8], Mask<'_>) {
+        (self.texels, Mask { tiles: self.tiles, blocks: self.blocks, shape: self.shape })
+    }
 }
 
 /// Codes `picture`, of a byte a texel, its mask first.
@@ -58,15 +71,17 @@ pub fn code<B: Bits>(bits: &mut B, Scratch { contexts, recent, .. }: Scratch<'_>
     contexts.fill(Probability::NEW);
     code_mask(bits, contexts, picture);
     let Some(mut models) = Models::new(contexts, recent) else { return };
-    let Picture { width_log2, texels, mask } = picture;
-    let width = 1usize.wrapping_shl(*width_log2);
-    for row in 0..texels.len().wrapping_shr(*width_log2) {
-        let start = row.wrapping_shl(*width_log2);
+    let (texels, mask) = picture.parts();
+    let width_log2 = mask.shape.width_log2;
+    let width = 1usize.wrapping_shl(width_log2);
+    let mut known = [0; WIDEST >> 3];
+    for row in 0..texels.len().wrapping_shr(width_log2) {
+        let start = row.wrapping_shl(width_log2);
         let Some((done, own)) = texels.split_at_mut_checked(start) else { return };
         // Rows that are not there are empty.
         let above = |rows: usize| done.get(start.wrapping_sub(width.wrapping_mul(rows))..).unwrap_or(&[]);
-        let covered = mask.get(start >> 3..).unwrap_or(&[]);
-        models.row(bits, own.get_mut(..width).unwrap_or(&mut []), above(1), above(2), covered);
+        covered(&mask, row, &mut known);
+        models.row(bits, own.get_mut(..width).unwrap_or(&mut []), above(1), above(2), &known);
     }
 }
 
@@ -75,8 +90,8 @@ pub fn code_nibbles<B: Bits>(bits: &mut B, scratch: Scratch<'_>, picture: &mut P
     let Scratch { contexts, recent, rows } = scratch;
     contexts.fill(Probability::NEW);
     code_mask(bits, contexts, picture);
-    let Picture { width_log2, texels, mask } = picture;
-    code_plane(bits, contexts, recent, rows, *width_log2, &mut Nibbles { texels, mask });
+    let (texels, mask) = picture.parts();
+    code_plane(bits, contexts, recent, rows, mask.shape.width_log2, &mut Nibbles { texels, mask });
 }
 
 /// Codes `picture`, of RGB565, like [`code`], but as three planes one after the other: green; then red and blue, each less half of
@@ -85,10 +100,10 @@ pub fn code_direct<B: Bits>(bits: &mut B, scratch: Scratch<'_>, picture: &mut Pi
     let Scratch { contexts, recent, rows } = scratch;
     contexts.fill(Probability::NEW);
     code_mask(bits, contexts, picture);
-    let Picture { width_log2, texels, mask } = picture;
+    let (texels, mask) = picture.parts();
     for part in [Part::Green, Part::Red, Part::Blue] {
         let texels = texels.as_chunks_mut().0;
-        code_plane(bits, contexts, recent, rows, *width_log2, &mut Direct { texels, mask, part });
+        code_plane(bits, contexts, recent, rows, mask.shape.width_log2, &mut Direct { texels, mask, part });
     }
 }
 
@@ -137,7 +152,7 @@ fn code_plane<B: Bits>(
 /// Texels of half a byte, two in each.
 struct Nibbles<'p> {
     texels: &'p mut [u8],
-    mask: &'p [u8],
+    mask: Mask<'p>,
 }
 
 impl Plane for Nibbles<'_> {
@@ -150,7 +165,7 @@ impl Plane for Nibbles<'_> {
         for ([low, high], two) in own.as_chunks_mut().0.iter_mut().zip(texels) {
             (*low, *high) = (two & 15, two >> 4);
         }
-        covered(self.mask, start, known);
+        covered(&self.mask, start.wrapping_shr(self.mask.shape.width_log2), known);
     }
 
     fn store(&mut self, start: usize, own: &[u8]) {
@@ -161,11 +176,16 @@ impl Plane for Nibbles<'_> {
     }
 }
 
-/// Which of a row's texels belong to a chart; all without a mask.
-fn covered(mask: &[u8], start: usize, known: &mut [u8]) {
-    match mask.get(start >> 3..start.wrapping_shr(3).wrapping_add(known.len())) {
-        Some(row) => known.copy_from_slice(row),
-        None => known.fill(0xff),
+/// Which of the texels of row `row` belong to a chart, as far as the bit of the `mask` to the right of their middle and below it knows; all without a mask.
+fn covered(mask: &Mask<'_>, row: usize, known: &mut [u8]) {
+    if mask.tiles.is_empty() {
+        return known.fill(0xff);
+    }
+    let middle = (1 << PLAY_BITS) >> 1;
+    let at = |texel: usize| (texel as i32).wrapping_shl(PLAY_BITS) | middle;
+    for (first, eight) in (0..).step_by(8).zip(known) {
+        let bit = |k: usize| u8::from(mask.covers(PlayUv { u: at(first | k), v: at(row) })) << (k & 7);
+        *eight = (0..8).fold(0, |bits, k| bits | bit(k));
     }
 }
 
@@ -180,7 +200,7 @@ enum Part {
 /// One component of texels of RGB565.
 struct Direct<'p> {
     texels: &'p mut [[u8; 2]],
-    mask: &'p [u8],
+    mask: Mask<'p>,
     part: Part,
 }
 
@@ -226,7 +246,7 @@ impl Plane for Direct<'_> {
             *byte = self.part.byte(u16::from_le_bytes(*texel));
         }
         if self.part == Part::Green {
-            return covered(self.mask, start, known);
+            return covered(&self.mask, start.wrapping_shr(self.mask.shape.width_log2), known);
         }
         // Where what is known of a texel is as to the left, the rest most often is too.
         let all = if self.part == Part::Red { 0x07e0 } else { 0xffe0 };
@@ -255,35 +275,76 @@ fn coded<B: Bits>(bits: &mut B, contexts: &mut [Probability], context: usize, bi
     contexts.get_mut(context).is_some_and(|context| bits.bit(context, bit))
 }
 
-/// Codes the mask: each bit by the two to its left, the five above these and the three above those.
+/// The numbers of the blocks that cover all, and nothing.
+const PLAINS: [u16; 2] = [0, 1];
+/// Contexts of a block's bits; those of what stands at a tile come after.
+const BITS: usize = 1 << 10;
+/// Ways to tell what stands at a tile: as to the left, as above, all, nothing, a new block.
+const NEW: usize = 4;
+
+/// Codes the mask, tile by tile: which block stands there, and where that is a new one its bits.
 fn code_mask<B: Bits>(bits: &mut B, contexts: &mut [Probability], picture: &mut Picture<'_>) {
-    let bytes = 1usize.wrapping_shl(picture.width_log2) >> 3;
-    for row in 0..picture.mask.len().wrapping_mul(8).wrapping_shr(picture.width_log2) {
-        let start = row.wrapping_mul(bytes);
-        let Some((done, own)) = picture.mask.split_at_mut_checked(start) else { return };
-        // A row above; empty where there is none.
-        let above = |rows: usize| {
-            let from = start.wrapping_sub(bytes.wrapping_mul(rows));
-            done.get(from..from.wrapping_add(bytes)).unwrap_or(&[])
+    let Picture { shape, tiles, blocks, .. } = picture;
+    let Some((contexts, kinds)) = contexts.split_at_mut_checked(BITS) else { return };
+    let width = 1usize.wrapping_shl(shape.row_log2());
+    blocks.iter_mut().zip(PLAIN).for_each(|(block, plain)| *block = plain);
+    let mut known = PLAIN.len();
+    for at in 0..tiles.len() {
+        let Some((done, [own, ..])) = tiles.split_at_mut_checked(at) else { break };
+        let column = at & width.wrapping_sub(1);
+        let number = |back: usize| done.get(at.wrapping_sub(back)).map_or(PLAINS[1], |tile| u16::from_le_bytes(*tile));
+        let (west, north) = (if column == 0 { PLAINS[1] } else { number(1) }, number(width));
+        let wanted = u16::from_le_bytes(*own);
+        let class = |number: u16| usize::from(number.min(2));
+        let mut told = |bits: &mut B, way: usize, is: bool| {
+            let context = way.wrapping_mul(9).wrapping_add(class(west).wrapping_mul(3)).wrapping_add(class(north));
+            coded(bits, kinds, context, is)
         };
-        let (near, far) = (above(1), above(2));
-        let bit = |row: &[u8], column: usize| row.get(column >> 3).map_or(0, |byte| usize::from(byte >> (column & 7) & 1));
-        let (mut left, mut first, mut second) = (0usize, bit(near, 0) << 1 | bit(near, 1), bit(far, 0));
-        let mut column = 0usize;
-        for byte in own.iter_mut().take(bytes) {
-            let mut coming = *byte;
-            for _ in 0..8 {
-                first = (first << 1 | bit(near, column.wrapping_add(2))) & 31;
-                second = (second << 1 | bit(far, column.wrapping_add(1))) & 7;
-                let covered = coded(bits, contexts, second << 7 | first << 2 | left, coming & 1 == 1);
-                // What is coded comes in at the top as what is wanted goes out at the bottom.
-                coming = coming >> 1 | u8::from(covered) << 7;
-                left = (left << 1 | usize::from(covered)) & 3;
-                column = column.wrapping_add(1);
+        let tried = [west, north, PLAINS[0], PLAINS[1]];
+        let mut like = tried.iter().enumerate().filter(|&(way, candidate)| !tried.iter().take(way).any(|before| before == candidate));
+        let found = like.find(|&(way, &candidate)| told(bits, way, candidate == wanted)).map(|(_, &candidate)| candidate);
+        let found = found.unwrap_or_else(|| {
+            if known < blocks.len() && told(bits, NEW, usize::from(wanted) == known) {
+                let (before, rest) = blocks.split_at_mut(known);
+                if let Some(block) = rest.first_mut() {
+                    let place = [column, at.wrapping_shr(shape.row_log2())].map(|tile| (tile << BLOCK_LOG2) as u32);
+                    code_block(bits, contexts, &Mask { tiles: done, blocks: before, shape: *shape }, place, block);
+                }
+                known = known.wrapping_add(1);
+                return known.wrapping_sub(1) as u16;
             }
-            *byte = coming;
+            bits.flat(16, wanted.into()) as u16
+        });
+        *own = found.to_le_bytes();
+    }
+    // What is not told must not show what the caller's memory held.
+    blocks.get_mut(known..).unwrap_or(&mut []).fill(PLAIN[1]);
+}
+
+/// Codes the block whose first bit is `place`, where `mask` is known above it and to the left: each bit by the two to its left, the five above these and
+/// the three above those.
+fn code_block<B: Bits>(bits: &mut B, contexts: &mut [Probability], mask: &Mask<'_>, [left, top]: [u32; 2], block: &mut Block) {
+    let columns = 1u32.wrapping_shl(mask.shape.row_log2().wrapping_add(BLOCK_LOG2));
+    let mut own: Block = [0; 8];
+    for (y, wanted) in (0u32..).zip(*block) {
+        for x in 0..8u32 {
+            // A bit so much to the right and so far above; none beyond the picture, nor where none is coded.
+            let bit = |right: u32, above: u32| {
+                let (x, y) = (x.wrapping_add(right), y.wrapping_sub(above));
+                let inside = own.get(y as usize).filter(|_| x < 8).map(|row| row >> x & 1 == 1);
+                let at = [left.wrapping_add(x), top.wrapping_add(y)];
+                usize::from(inside.unwrap_or_else(|| at[0] < columns && at[1] < u32::MAX >> 1 && mask.bit(at)))
+            };
+            let back = |by: u32| by.wrapping_neg();
+            let places = [(back(1), 2), (0, 2), (1, 2), (back(2), 1), (back(1), 1), (0, 1), (1, 1), (2, 1), (back(2), 0), (back(1), 0)];
+            let context = places.iter().fold(0, |context, &(right, above)| context << 1 | bit(right, above));
+            let covered = coded(bits, contexts, context, wanted >> x & 1 == 1);
+            if let Some(row) = own.get_mut(y as usize) {
+                *row |= u8::from(covered) << x;
+            }
         }
     }
+    *block = own;
 }
 
 /// What is known around a texel.

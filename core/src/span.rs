@@ -196,7 +196,7 @@ pub fn paint<T>(out: &mut [T], mut shown: u32, mut span: Span, texture: &Texture
 pub fn covered(shown: u32, mut span: Span, texture: &Texture<'_>) -> u32 {
     let (mut rest, mut bit, mut covered) = (shown, 1u32, 0u32);
     while rest != 0 {
-        if rest & 1 != 0 && texture.covered(span.from) {
+        if rest & 1 != 0 && texture.mask.covers(span.from) {
             covered |= bit;
         }
         (rest, bit) = (rest >> 1, bit.wrapping_shl(1));
@@ -240,7 +240,7 @@ mod tests {
             seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             ((u64::from(seed) * u64::from(below)) >> 32) as i32
         };
-        let texture = Texture { texels: &[], mask: &[], width_log2: 9, height: 512 };
+        let texture = Texture { width_log2: 9, height: 512, ..Texture::default() };
         let chart = Chart::new(&LabelRecord { left: 20, top: 30, right: 24, bottom: 33, ..LabelRecord::default() });
         let (mut some, mut none) = (0, 0);
         for round in 0..20_000u32 {

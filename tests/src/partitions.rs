@@ -60,7 +60,7 @@ fn covers(image: &SourceImage, label: u16, at: [f64; 2]) -> bool {
     let label = &image.labels[usize::from(label)];
     let [left, top, right, bottom] = label.rect.map(f64::from);
     let inside = (left..right).contains(&at[0]) && (top..bottom).contains(&at[1]);
-    inside && (!label.masked || image.covered[texel(image, at)])
+    inside && (!label.masked || image.covered_at(at.map(|x| x as f32)))
 }
 
 /// A ray at one of the eight nodes around a pixel.

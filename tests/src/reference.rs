@@ -2,7 +2,7 @@
 //! Keys are decoded with the core's own description of the stream; everything after that (time, space, coverage, texel) is
 //! said again here, in the simplest way that can be checked by reading. Pictures go to the differential tests.
 
-use cubist_baker::encode::unpacked;
+use cubist_baker::encode::{Unpacked, unpacked};
 use cubist_core::Bundle;
 use cubist_core::coder::{Decoder, Probability};
 use cubist_core::fixed::{ONE, PlayUv};
@@ -106,8 +106,7 @@ pub struct Reference<'a> {
     /// For every interval the cells' labels and their tests, front to back.
     lists: Vec<Vec<Vec<(u8, u16)>>>,
     /// The source image as a raw bundle has it.
-    texels: Vec<u8>,
-    mask: Vec<u8>,
+    image: Unpacked,
 }
 
 impl<'a> Reference<'a> {
@@ -146,8 +145,7 @@ impl<'a> Reference<'a> {
             step_log2: u32::from(path.step_log2),
             planes: bundle.planes(),
         };
-        let (texels, mask) = unpacked(bundle);
-        let mut reference = Self { bundle, grid, keys: Vec::new(), lists: Vec::new(), texels, mask };
+        let mut reference = Self { bundle, grid, keys: Vec::new(), lists: Vec::new(), image: unpacked(bundle) };
         let mut run = 0;
         for key in 0..bundle.key_count() {
             run = if bundle.key(key).independent { 0 } else { run + 1 };
@@ -322,27 +320,34 @@ impl<'a> Reference<'a> {
         [1u32 << self.bundle.atlas().width_log2, u32::from(self.bundle.atlas().height)].map(f64::from)
     }
 
-    /// Whether the chart of `label` covers `at`: inside the rectangle and, where the label has a mask, on a texel of the chart.
+    /// Whether the chart of `label` covers `at`: inside the rectangle and, where the label has a mask, on a bit of that.
     fn covers(&self, label: u8, [u, v]: [f64; 2]) -> bool {
         let record = self.bundle.label(label);
         let [left, top, right, bottom] = [record.left, record.top, record.right, record.bottom].map(f64::from);
         if !((left..right).contains(&u) && (top..bottom).contains(&v)) {
             return false;
         }
-        let index = self.texel([u, v]);
-        record.flags & MASKED == 0 || self.mask[index / 8] & 1 << (index % 8) != 0
+        if record.flags & MASKED == 0 {
+            return true;
+        }
+        let Unpacked { tiles, blocks, .. } = &self.image;
+        let atlas = self.bundle.atlas();
+        let [x, y] = [u, v].map(|at| (at * f64::from(1u32 << atlas.finer)) as usize);
+        let [low, high] = tiles[(y / 8 << (atlas.width_log2 + atlas.finer) >> 3) + x / 8];
+        let block = blocks.get(usize::from(low) + 256 * usize::from(high));
+        block.is_some_and(|rows| rows[y % 8] & 1 << (x % 8) != 0)
     }
 
     fn colour(&self, at: [f64; 2]) -> u16 {
         let (atlas, index) = (self.bundle.atlas(), self.texel(at));
         let two_bytes = |of: &[u8], at: usize| u16::from_le_bytes([of[2 * at], of[2 * at + 1]]);
         match self.bundle.texel_kind() {
-            TexelKind::Indexed8 => two_bytes(atlas.palette, usize::from(self.texels[index])),
+            TexelKind::Indexed8 => two_bytes(atlas.palette, usize::from(self.image.texels[index])),
             TexelKind::Indexed4 => {
-                let both = self.texels[index / 2];
+                let both = self.image.texels[index / 2];
                 two_bytes(atlas.palette, usize::from(if index.is_multiple_of(2) { both % 16 } else { both / 16 }))
             }
-            TexelKind::Direct565 => two_bytes(&self.texels, index),
+            TexelKind::Direct565 => two_bytes(&self.image.texels, index),
         }
     }
 

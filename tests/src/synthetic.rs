@@ -2,7 +2,7 @@
 //! Functions come from the tests; bundles go back to them.
 
 use anyhow::Result;
-use cubist_baker::atlas::{Label, SourceImage, Storage};
+use cubist_baker::atlas::{Label, Outline, SourceImage, Storage};
 use cubist_baker::bake::Coverage;
 use cubist_baker::encode::{self, CodingSettings, Content, Header};
 use cubist_baker::gbuffer::GBuffer;
@@ -58,7 +58,8 @@ impl Synthetic {
         let texels = (0..width * height).map(|at| ((at % width * 7 + at / width * 13) & 0xff) as u16).collect();
         let palette = (0..=255u8).map(|at| [at & 0xf8, at & 0xfc, (at << 3) & 0xf8]).collect();
         let covered = vec![true; (width * height) as usize];
-        let image = SourceImage { width, height, kind: TexelKind::Indexed8, texels, palette, covered, labels };
+        let outline = Outline { finer: 0, bits: covered.clone() };
+        let image = SourceImage { width, height, kind: TexelKind::Indexed8, texels, palette, covered, outline, labels };
         let pixels = (0..self.frames).flat_map(|frame| (0..down).flat_map(move |y| (0..across).map(move |x| (frame, x, y))));
         let uv: Vec<[f32; 2]> = pixels.map(|(frame, x, y)| place(frame, x, y)).collect();
         let gbuffer = GBuffer { width: across, height: down, frames: self.frames, label: vec![1; uv.len()], uv: uv.into() };

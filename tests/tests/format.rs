@@ -114,7 +114,7 @@ impl Dump<'_> {
                 "PATH" => self.path(),
                 "ATLS" => self.atlas(),
                 "LABL" => self.labels(length),
-                "MASK" => self.take(length, "one bit a texel"),
+                "MASK" => self.take(length, "tiles of the mask, two bytes each, then its blocks, eight bytes each"),
                 _ => self.take(length, "text"),
             }
         }
@@ -169,6 +169,8 @@ impl Dump<'_> {
         self.byte("width_log2 ");
         self.varint("height ", "");
         self.byte("encoding ");
+        self.byte("finer ");
+        self.varint("", " blocks of the mask");
         let palette = self.varint("", " bytes of palette");
         self.take(palette, "RGB565");
         let texels = self.varint("", " bytes of texels");

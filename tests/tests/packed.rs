@@ -15,14 +15,14 @@ const SCENES: [&str; 2] = ["street", "terrain"];
 
 /// A scene baked raw and packed.
 fn both(name: &str) -> (Flat, [Vec<u8>; 2]) {
-    both_of(name, TexelKind::Indexed8)
+    both_of(name, TexelKind::Indexed8, None)
 }
 
-/// A scene baked raw and packed, with texels of `kind`.
-fn both_of(name: &str, kind: TexelKind) -> (Flat, [Vec<u8>; 2]) {
+/// A scene baked raw and packed, with texels of `kind` and 2^`outline` bits of outline a texel.
+fn both_of(name: &str, kind: TexelKind, outline: Option<u32>) -> (Flat, [Vec<u8>; 2]) {
     let scene = scenes::reduced(name, SIZE, FRAMES).expect("a built-in scene");
     let mut settings = Settings::default();
-    settings.atlas.texels = kind;
+    (settings.atlas.texels, settings.atlas.outline) = (kind, outline);
     scenes::raw_and_packed(&scene, &settings).expect("it bakes")
 }
 
@@ -43,13 +43,13 @@ fn packed_plays_the_pixels_of_raw() {
         assert!(pixels(&raw, 0) == pixels(&packed, 0xa5), "{name}: other pixels");
         let (raw_bundle, packed_bundle) = (Bundle::parse(&raw).expect("raw"), Bundle::parse(&packed).expect("packed"));
         assert!(encode::unpacked(&raw_bundle) == encode::unpacked(&packed_bundle), "{name}: other texels or another mask");
-        assert!(encode::unpacked(&packed_bundle).0 == bytes_of(&flat), "{name}: other texels");
+        assert!(encode::unpacked(&packed_bundle).texels == bytes_of(&flat), "{name}: other texels");
         let (before, after) = (Inspection::of(&raw).expect("raw"), Inspection::of(&packed).expect("packed"));
         let [was, is] = [&before, &after].map(|i| i.section_bytes(ATLAS) + i.section_bytes(MASK));
         println!("{name}: {} -> {} bytes, image and mask {was} -> {is}", raw.len(), packed.len());
         assert!(is * 2 < was, "{name}: {was} bytes became {is}");
         assert!(before.section_bytes(MASK) > 0 && after.section_bytes(MASK) == 0, "{name}: the mask is in the picture");
-        assert_eq!(before.image.covered_texels, after.image.covered_texels);
+        assert_eq!(before.image.mask, after.image.mask);
         // Unpacking itself needs no more than what playing has there later.
         assert_eq!(after.workspace - before.workspace, after.unpacked_bytes(), "{name}");
         assert_eq!(before.unpacked_bytes(), 0);
@@ -59,29 +59,30 @@ fn packed_plays_the_pixels_of_raw() {
 
 #[test]
 fn the_document_says_how_to_unpack() {
-    for name in SCENES {
-        let (flat, [_, packed]) = both(name);
+    for (name, finer) in SCENES.into_iter().flat_map(|name| [0, 1, 2].map(|finer| (name, finer))) {
+        let (flat, [_, packed]) = both_of(name, TexelKind::Indexed8, Some(finer));
         let bundle = Bundle::parse(&packed).expect("packed");
         let (width, height) = (flat.atlas.image.width as i32, flat.atlas.image.height as i32);
         let bytes = bundle.packed().expect("it is packed");
         let mut reader = Reader::new(bytes);
-        let mask = reader.mask(width, height);
-        let texels = reader.texels(width, height, &mask);
+        let mask = reader.mask(width, height, finer, bundle.atlas().blocks as usize);
+        assert!(mask == flat.atlas.image.outline.bits, "{name}: another mask");
+        let texels = reader.texels(width, height, &middles(&mask, width, height, finer));
         assert!(texels == bytes_of(&flat), "{name}: other texels");
-        assert!(mask == flat.atlas.image.covered, "{name}: another mask");
     }
 }
 
 #[test]
 fn the_document_says_how_to_unpack_texels_that_are_no_bytes() {
     for kind in [TexelKind::Indexed4, TexelKind::Direct565] {
-        let (flat, [_, packed]) = both_of("street", kind);
+        let (flat, [_, packed]) = both_of("street", kind, Some(1));
         let image = &flat.atlas.image;
         let (width, height) = (image.width as i32, image.height as i32);
         let bundle = Bundle::parse(&packed).expect("packed");
         let mut reader = Reader::new(bundle.packed().expect("it is packed"));
-        let mask = reader.mask(width, height);
-        assert!(mask == image.covered, "another mask");
+        let mask = reader.mask(width, height, 1, bundle.atlas().blocks as usize);
+        assert!(mask == image.outline.bits, "another mask");
+        let mask = middles(&mask, width, height, 1);
         if kind == TexelKind::Indexed4 {
             let texels = reader.texels(width, height, &mask);
             assert!(texels.iter().zip(&image.texels).all(|(&found, &wanted)| u16::from(found & 15) == wanted), "other texels");
@@ -146,20 +147,63 @@ impl<'b> Reader<'b> {
         bit
     }
 
-    /// The mask of a picture with masked labels.
-    fn mask(&mut self, width: i32, height: i32) -> Vec<bool> {
-        let (mut contexts, mut mask) = (vec![NEW; 1024], Vec::new());
-        for (x, y) in places(width, height) {
-            let m = |i: i32, j: i32| {
-                let inside = (0..width).contains(&(x + i)) && y + j >= 0;
-                usize::from(inside && mask[((y + j) * width + x + i) as usize])
-            };
-            let own = 2 * m(-2, 0) + m(-1, 0);
-            let first = 16 * m(-2, -1) + 8 * m(-1, -1) + 4 * m(0, -1) + 2 * m(1, -1) + m(2, -1);
-            let second = 4 * m(-1, -2) + 2 * m(0, -2) + m(1, -2);
-            mask.push(self.bit(&mut contexts[128 * second + 4 * first + own]));
+    /// The mask of a picture with masked labels: the bits, row by row.
+    fn mask(&mut self, width: i32, height: i32, finer: u32, blocks: usize) -> Vec<bool> {
+        let [wide, high] = [width << finer, height << finer];
+        let row = wide as usize / 8;
+        let (mut bits, mut kinds) = (vec![NEW; 1024], vec![NEW; 45]);
+        let mut known = vec![[[true; 8]; 8], [[false; 8]; 8]];
+        let mut tiles = Vec::new();
+        // Whole blocks below each other, with the last ones' rows beyond the picture.
+        let mut mask = vec![false; 64 * row * (high as usize).div_ceil(8)];
+        for at in 0..row * (high as usize).div_ceil(8) {
+            let west = if at % row == 0 { 1 } else { tiles[at - 1] };
+            let north = if at < row { 1 } else { tiles[at - row] };
+            let context = |way: usize| 9 * way + 3 * usize::min(west, 2) + usize::min(north, 2);
+            let mut number = None;
+            let mut tried = Vec::new();
+            for (way, c) in [west, north, 0, 1].into_iter().enumerate() {
+                if number.is_none() && !tried.contains(&c) {
+                    number = self.bit(&mut kinds[context(way)]).then_some(c);
+                    tried.push(c);
+                }
+            }
+            let (left, top) = ((at % row * 8) as i32, (at / row * 8) as i32);
+            if number.is_none() && known.len() < blocks && self.bit(&mut kinds[context(4)]) {
+                number = Some(known.len());
+                known.push([[false; 8]; 8]);
+                for (x, y) in places(8, 8) {
+                    let m = |i: i32, j: i32| {
+                        let (x, y) = (left + x + i, top + y + j);
+                        usize::from((0..wide).contains(&x) && y >= 0 && mask[(y * wide + x) as usize])
+                    };
+                    let around = [(-1, -2), (0, -2), (1, -2), (-2, -1), (-1, -1), (0, -1), (1, -1), (2, -1), (-2, 0), (-1, 0)];
+                    let context = around.iter().fold(0, |context, &(i, j)| 2 * context + m(i, j));
+                    let bit = self.bit(&mut bits[context]);
+                    mask[((top + y) * wide + left + x) as usize] = bit;
+                    known.last_mut().expect("just made")[y as usize][x as usize] = bit;
+                }
+            }
+            let number = number.unwrap_or_else(|| (0..16).fold(0, |bits, _| 2 * bits + usize::from(self.flat())));
+            for (x, y) in places(8, 8) {
+                mask[((top + y) * wide + left + x) as usize] = known[number][y as usize][x as usize];
+            }
+            tiles.push(number);
         }
+        assert_eq!(known.len(), blocks);
+        mask.truncate((wide * high) as usize);
         mask
+    }
+
+    fn flat(&mut self) -> bool {
+        self.range >>= 1;
+        let bit = self.code >= self.range;
+        self.code -= if bit { self.range } else { 0 };
+        if self.range < 1 << 24 {
+            self.range <<= 8;
+            self.shift();
+        }
+        bit
     }
 
     /// The texels of a picture of bytes; `known`: the mask, or what stands for it.
@@ -215,6 +259,12 @@ impl<'b> Reader<'b> {
         }
         texels
     }
+}
+
+/// The bits of `mask` that hold the middles of texels.
+fn middles(mask: &[bool], width: i32, height: i32, finer: u32) -> Vec<bool> {
+    let middle = |at: i32| ((2 * at + 1) << finer) / 2;
+    places(width, height).map(|(x, y)| mask[(middle(y) * (width << finer) + middle(x)) as usize]).collect()
 }
 
 /// A picture's columns and rows, row by row.

@@ -35,7 +35,10 @@ fn wider(four: &[u8]) -> Vec<u8> {
     let twice =
         |bytes: &[u8], row: usize| -> Vec<u8> { bytes.chunks(row).flat_map(|own| own.iter().copied().chain(vec![0; row])).collect() };
     let texels = twice(atlas.texels, 1 << atlas.width_log2 >> 1);
-    let mask = bundle.sections().find(|section| section.tag == MASK).map(|section| twice(section.bytes, 1 << atlas.width_log2 >> 3));
+    let mask = bundle.sections().find(|section| section.tag == MASK).map(|section| {
+        let (tiles, blocks) = section.bytes.split_at(2 * bundle.mask().shape.tiles());
+        [&twice(tiles, 2 << atlas.width_log2 >> 3), blocks].concat()
+    });
     let bytes = with_atlas(four, &Atlas { width_log2: atlas.width_log2 + 1, texels: &texels, ..atlas });
     mask.map_or(bytes.clone(), |mask| tamper::with_section(&bytes, MASK, &mask).expect("there is a mask"))
 }

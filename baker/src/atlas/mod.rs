@@ -6,6 +6,7 @@ mod footprint;
 mod grid;
 mod halve;
 mod mask;
+mod outline;
 mod pack;
 mod palette;
 mod place;
@@ -15,7 +16,8 @@ use crate::chart::{self, Charting, Choice, Density, Family};
 use crate::gbuffer::{BACKGROUND, GBuffer, Hits};
 use crate::scene::{Background, Scene};
 use crate::shade::Shader;
-use cubist_core::format::TexelKind;
+use cubist_core::format::{MOST_FINER, TexelKind};
+pub use outline::{Outline, Tiled};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -57,7 +59,7 @@ pub enum Storage {
     /// As texels are: read from flash as they lie there, no memory.
     #[default]
     Raw,
-    /// Coded, for a smaller bundle: the player unpacks it into its memory, as much as raw and an eighth of a byte a texel for the mask.
+    /// Coded, for a smaller bundle: the player unpacks it into its memory, as much as raw.
     Packed,
 }
 
@@ -88,6 +90,8 @@ pub struct Settings {
     pub colours: usize,
     /// How the bundle holds it.
     pub storage: Storage,
+    /// The outline has 2^this bits a texel in each direction, 0..=[`MOST_FINER`], where a bundle can hold that; `None`: 1, but finer ones are at hand.
+    pub outline: Option<u32>,
     /// How the surface is cut and flattened.
     pub charts: Choice,
 }
@@ -101,6 +105,7 @@ impl Default for Settings {
             texels: TexelKind::Indexed8,
             colours: 256,
             storage: Storage::Raw,
+            outline: None,
             charts: Family::Own.into(),
         }
     }
@@ -141,6 +146,8 @@ pub struct SourceImage {
     pub palette: Vec<[u8; 3]>,
     /// Which texels show a surface rather than continue one.
     pub covered: Vec<bool>,
+    /// What of them does, as the player tells: finer than texels, perhaps.
+    pub outline: Outline,
     /// Label 0 is the background.
     pub labels: Vec<Label>,
 }
@@ -159,11 +166,14 @@ impl SourceImage {
         self.colour(self.texels[self.place(uv)])
     }
 
-    /// Whether the texel at a position shows a surface rather than continues one; outside the image the nearest texel.
+    /// Whether a position lies inside the outline; outside the image the nearest one that is in it.
     #[inline]
     #[must_use]
-    pub fn covered_at(&self, uv: [f32; 2]) -> bool {
-        self.covered[self.place(uv)]
+    pub fn covered_at(&self, [u, v]: [f32; 2]) -> bool {
+        let Outline { finer, bits } = &self.outline;
+        let scale = (1 << finer) as f32;
+        let (x, y) = (((u * scale) as u32).min((self.width << finer) - 1), ((v * scale) as u32).min((self.height << finer) - 1));
+        bits[((y * self.width) << finer) as usize + x as usize]
     }
 
     /// The index of the texel at a position, texels; outside the image that of the nearest texel.
@@ -198,6 +208,8 @@ pub struct Figures {
 pub struct Atlas {
     /// The picture.
     pub image: SourceImage,
+    /// Finer outlines that it could have, the finest last; none where the settings say which one it has.
+    pub finer: Vec<Outline>,
     /// Where the pixels fall in it.
     pub gbuffer: GBuffer,
     /// For the reports.
@@ -257,13 +269,23 @@ pub(crate) fn of_charts(
     progress(3, 4);
     let kind = settings.texels;
     let (texels, palette) = reduced(&filled.colours, &seen.count, settings);
-    let labels = outline(&charting, &layout, &label_of, labels, fixed, &filled.covered);
+    let labels = rectangles(&charting, &layout, &label_of, labels, fixed, &filled.covered);
     let fill = filled.covered.iter().filter(|&&c| c).count() as f64 / filled.covered.len().max(1) as f64;
     let figures =
         Figures { charts: charting.charts.len(), halved, labels: labels.len(), crowded, fill, scale: layout.scale, gutter: layout.gutter };
     progress(4, 4);
-    let image = SourceImage { width: layout.width, height: layout.height, kind, texels, palette, covered: filled.covered, labels };
-    Ok(Atlas { image, gbuffer, figures })
+    let outlined = |finer: u32| outline::outline(scene, &charting, &layout, &gbuffer, &filled.covered, finer);
+    let masked = labels.iter().any(|label| label.masked);
+    let finer: Vec<Outline> = match settings.outline {
+        None if masked => (1..=u32::from(MOST_FINER)).map_while(outlined).collect(),
+        _ => Vec::new(),
+    };
+    // The finest that a bundle can hold.
+    let asked = settings.outline.filter(|_| masked).and_then(|finer| (1..=finer).rev().find_map(outlined));
+    let outline = asked.unwrap_or_else(|| Outline { finer: 0, bits: filled.covered.clone() });
+    let (width, height) = (layout.width, layout.height);
+    let image = SourceImage { width, height, kind, texels, palette, covered: filled.covered, outline, labels };
+    Ok(Atlas { image, finer, gbuffer, figures })
 }
 
 /// Indices and palette of `colours`; a texel weighs as much as the pixels that see it.
@@ -337,7 +359,7 @@ fn locate(scene: &Scene, hits: &Hits, charting: &Charting, layout: &pack::Layout
 }
 
 /// The labels: the rectangles around their charts.
-fn outline(charting: &Charting, layout: &pack::Layout, label_of: &[u16], count: usize, fixed: Fixed, covered: &[bool]) -> Vec<Label> {
+fn rectangles(charting: &Charting, layout: &pack::Layout, label_of: &[u16], count: usize, fixed: Fixed, covered: &[bool]) -> Vec<Label> {
     let mut rects = vec![[u32::MAX, u32::MAX, 0, 0]; count + 1];
     rects[0] = layout.backdrop;
     for (chart, place) in layout.places.iter().enumerate().take(charting.charts.len()) {

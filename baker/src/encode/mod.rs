@@ -21,7 +21,7 @@ use cubist_core::nodes::{self, Layout, Mark, Trace};
 use cubist_core::plane::{CAMERA_BYTES, Camera, PLANE_BYTES, Plane, View};
 use cubist_core::record::{LISTS, MAX_KEYS, Place, Shape, Stream};
 pub use limits::Exceeded;
-pub use picture::{image_bytes, packed, raw_bytes, unpacked};
+pub use picture::{Unpacked, image_bytes, packed, raw_bytes, unpacked};
 use range::Encoder;
 
 /// How keys are coded.
@@ -129,10 +129,13 @@ fn atlas_bytes(image: &SourceImage, storage: Storage) -> Vec<u8> {
         Storage::Packed => (PACKED, packed(image)),
     };
     let encoding = image.kind.encoding() | packing;
+    let tiled = picture::tiled(image);
     postcard_bytes(&Atlas {
         width_log2: image.width.trailing_zeros() as u8,
         height: image.height as u16,
         encoding,
+        finer: if tiled.is_some() { image.outline.finer as u8 } else { 0 },
+        blocks: tiled.map_or(0, |tiled| tiled.blocks.len() as u32),
         palette: &palette,
         texels: &texels,
     })

@@ -54,8 +54,16 @@ pub fn bundle_of(kind: TexelKind) -> Vec<u8> {
         records: &records,
     };
     let path = postcard::to_stdvec(&path).expect("a path is plain data");
-    let atlas = postcard::to_stdvec(&Atlas { width_log2: 6, height: 64, encoding: kind.encoding(), palette: &palette, texels: &texels })
-        .expect("an image is plain data");
+    let atlas = postcard::to_stdvec(&Atlas {
+        width_log2: 6,
+        height: 64,
+        encoding: kind.encoding(),
+        finer: 0,
+        blocks: 0,
+        palette: &palette,
+        texels: &texels,
+    })
+    .expect("an image is plain data");
     let sections = [(PATH, &path), (ATLAS, &atlas), (LABELS, &labels)].map(|(tag, bytes)| Section { tag, required: true, bytes });
     let envelope = Envelope { magic: MAGIC, version: VERSION, sections: sections.into_iter().collect() };
     let mut bytes = postcard::to_stdvec(&envelope).expect("an envelope is plain data");
