@@ -68,3 +68,41 @@ pub fn reason(trials: &[Trial]) -> String {
     let all: Vec<String> = trials.iter().map(told).collect();
     format!("bits of outline a texel tried: {}", all.join("; "))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::atlas;
+    use crate::bake::{self, Settings};
+    use crate::chart::Family;
+    use crate::scene::builtin;
+    use cubist_core::format::SPACE_LINEAR;
+
+    fn chosen(name: &str, settings: Settings) -> (u32, Flat, Made, Vec<Trial>) {
+        let mut scene = builtin::build(name).unwrap();
+        (scene.playback.width, scene.playback.height, scene.playback.frames) = (64, 48, 17);
+        let mut flat = bake::flatten(&scene, &settings.atlas, &|_, _| {}).unwrap();
+        let usual = Made::new(&scene, &flat, settings).unwrap();
+        let (made, trials) = choose(&scene, &mut flat, usual, &|_, _| {}).unwrap();
+        (flat.atlas.image.outline.finer, flat, made, trials)
+    }
+
+    #[test]
+    fn what_stands_close_is_outlined_finely() {
+        // Stones seen so small that many stand in every cell.
+        let source = atlas::Settings { charts: Family::Sight.into(), ..atlas::Settings::default() };
+        let settings = Settings { key_interval: 4, space: SPACE_LINEAR, atlas: source, ..Settings::default() };
+        let (finer, flat, made, trials) = chosen("pivot", settings);
+        assert!(trials.len() == 3 && trials.iter().map(|trial| trial.bits).eq([1, 2, 4]), "{}", reason(&trials));
+        let best = trials.iter().map(Trial::worth).fold(f64::NEG_INFINITY, f64::max);
+        let trial = &trials[finer as usize];
+        assert!(finer > 0 && trial.worth() == best && trial.bytes == made.encoded.bundle.len(), "{}", reason(&trials));
+        assert_eq!((made.settings.atlas.outline, flat.atlas.finer.len()), (Some(finer), 0));
+    }
+
+    #[test]
+    fn few_outlines_stay_as_they_are() {
+        let (finer, _, _, trials) = chosen("pyramid", Settings::default());
+        assert!(finer == 0 && trials.is_empty());
+    }
+}

@@ -26,7 +26,14 @@ pub fn file(name: &str) -> PathBuf {
 /// # Errors
 /// Those of the baker.
 pub fn bundle(name: &str) -> Result<Vec<u8>> {
-    scenes::bundle(name, scenes::SIZE, scenes::FRAMES, &Settings::default())
+    let mut settings = Settings::default();
+    // Two of them have outlines finer than texels.
+    settings.atlas.outline = match name {
+        "round-columns" => Some(1),
+        "mirrors" => Some(2),
+        _ => None,
+    };
+    scenes::bundle(name, scenes::SIZE, scenes::FRAMES, &settings)
 }
 
 /// Bakes and plays scene `name` at the reduced setting: length of the bundle, CRC-32 of all of it but its own checksum, CRC-32 of the

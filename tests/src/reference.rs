@@ -333,7 +333,8 @@ impl<'a> Reference<'a> {
         let Unpacked { tiles, blocks, .. } = &self.image;
         let atlas = self.bundle.atlas();
         let [x, y] = [u, v].map(|at| (at * f64::from(1u32 << atlas.finer)) as usize);
-        let [low, high] = tiles[(y / 8 << (atlas.width_log2 + atlas.finer) >> 3) + x / 8];
+        let tiles_a_row = 1usize << (atlas.width_log2 + atlas.finer) >> 3;
+        let [low, high] = tiles[y / 8 * tiles_a_row + x / 8];
         let block = blocks.get(usize::from(low) + 256 * usize::from(high));
         block.is_some_and(|rows| rows[y % 8] & 1 << (x % 8) != 0)
     }

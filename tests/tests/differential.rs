@@ -289,6 +289,16 @@ fn intervals_that_are_no_power_of_two_agree() {
 }
 
 #[test]
+fn outlines_finer_than_texels_agree() {
+    for (name, outline) in [("round-columns", 1), ("mirrors", 2), ("street", 2)] {
+        let source = atlas::Settings { outline: Some(outline), ..atlas::Settings::default() };
+        let bytes = bake(name, SIZE, 17, &Settings { atlas: source, ..settings(8, 8) });
+        assert_eq!(Bundle::parse(&bytes).expect("sound").mask().shape.finer, outline, "{name}");
+        check(&format!("{name}, 2^{outline} bits of outline a texel"), &bytes, (0..17).step_by(3));
+    }
+}
+
+#[test]
 fn held_and_straight_time_agree() {
     for (name, time, interval) in [("street", TIME_LINEAR, 7), ("columns", TIME_HOLD, 4)] {
         let bytes = bake(name, SIZE, 32, &Settings { time, ..settings(8, interval) });

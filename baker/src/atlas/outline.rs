@@ -107,3 +107,69 @@ pub(super) fn outline(
     let outline = Outline { finer, bits };
     outline.tiled(layout.width).is_some().then_some(outline)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::atlas::{Settings, SourceImage, build};
+    use crate::cast::Cast;
+    use crate::gbuffer::BACKGROUND;
+    use crate::scene::builtin;
+    use cubist_core::fixed::PlayUv;
+    use cubist_core::mask::{Mask, Shape};
+
+    fn image(name: &str, outline: u32) -> (SourceImage, f64) {
+        let mut scene = builtin::build(name).unwrap();
+        (scene.playback.width, scene.playback.height, scene.playback.frames) = (128, 96, 9);
+        let cast = Cast::new(&scene, &|_, _| {});
+        let atlas = build(&scene, &cast.hits, &Settings { outline: Some(outline), ..Settings::default() }, &|_, _| {}).unwrap();
+        let surface = cast.hits.samples.iter().zip(atlas.gbuffer.uv.iter()).filter(|(sample, _)| sample.surface != BACKGROUND);
+        let outside = surface.clone().filter(|&(_, &uv)| !atlas.image.covered_at(uv)).count();
+        (atlas.image, 100.0 * outside as f64 / surface.count() as f64)
+    }
+
+    #[test]
+    fn what_pixels_see_is_inside_and_finer_outlines_are_closer() {
+        for name in ["round-columns", "mirrors"] {
+            let [whole, half, quarter] = [0, 1, 2].map(|finer| image(name, finer));
+            let area = |image: &SourceImage| {
+                let Outline { finer, bits } = &image.outline;
+                bits.iter().filter(|&&bit| bit).count() as f64 / f64::from(1u32 << (2 * finer))
+            };
+            assert_eq!((whole.1, whole.0.outline.bits == whole.0.covered), (0.0, true), "{name}");
+            // Pixels that fall between a face and the middle of a bit beside it.
+            assert!(half.1 < 2.0 && quarter.1 < 1.0, "{name}: {} % and {} % outside", half.1, quarter.1);
+            let areas = [&whole, &half, &quarter].map(|(image, _)| area(image));
+            assert!(areas[1] < areas[0] && areas[2] < areas[0], "{name}: {areas:?} texels");
+        }
+    }
+
+    #[test]
+    fn players_find_the_bits_that_are_there() {
+        for finer in [0, 1, 2] {
+            let (image, _) = image("round-columns", finer);
+            let Tiled { tiles, blocks } = image.outline.tiled(image.width).expect("not as many blocks as that");
+            let shape = Shape { width_log2: image.width.trailing_zeros(), height: image.height, finer };
+            assert!(tiles.len() == shape.tiles() && blocks.len() < tiles.len() && blocks[..2] == PLAIN);
+            let mask = Mask { tiles: &tiles, blocks: &blocks, shape };
+            let row = image.width << finer;
+            for (at, &bit) in (0..).zip(&image.outline.bits) {
+                let [u, v] = [at % row, at / row].map(|k| ((2 * k + 1) << 15 >> finer) as i32);
+                assert_eq!(mask.covers(PlayUv { u, v }), bit, "{at}");
+            }
+        }
+    }
+
+    #[test]
+    fn outlines_of_too_many_blocks_are_none() {
+        // A number in every block.
+        let (width, blocks) = (4096usize, MOST_BLOCKS as usize);
+        let bits = (0..width * 8 * blocks.div_ceil(width / 8)).map(|at| {
+            let (x, y) = (at % width, at / width);
+            let number = y / 8 * (width / 8) + x / 8;
+            number >> (8 * (y % 8) + x % 8).min(63) & 1 == 1
+        });
+        let outline = Outline { finer: 2, bits: bits.collect() };
+        assert!(outline.tiled(1024).is_none());
+    }
+}
