@@ -286,7 +286,7 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let bundle = match settings.sparing {
         Sparing::Nothing => code(settings.coding)?,
         Sparing::Unseen => spare::unseen(&flat.atlas, encode::image_bytes(image, settings.atlas.storage), settings.coding, code)?,
-        Sparing::Within(bytes) => spare::within(bytes, |lambda| code(CodingSettings { lambda, ..settings.coding }))?,
+        Sparing::Within(bytes) => spare::within(bytes, |lambda| code(settings.coding.worth(lambda)))?,
     };
     progress("coding keys", 1.0);
     Ok(Encoded { bundle, grid, dropped_pixels: sheets.dropped, torn_by_cause, seconds: start.elapsed().as_secs_f64() })

@@ -102,7 +102,9 @@ fn after(from: &Settings, step: Step, free: &Free) -> Option<Settings> {
     to.cell = rung(&CELLS, from.cell, step.cell)?;
     let scaled = if step.scale < 0 { from.key_interval >> -step.scale } else { from.key_interval << step.scale };
     to.key_interval = rung(&INTERVALS, scaled, step.interval)?;
-    to.coding.lambda = rung(&LAMBDAS, from.coding.lambda, step.lambda)?;
+    if step.lambda != 0 {
+        to.coding = from.coding.worth(rung(&LAMBDAS, from.coding.lambda, step.lambda)?);
+    }
     let other = |now: u8, [a, b]: [u8; 2]| if now == a { b } else { a };
     to.time = if step.time { other(from.time, [TIME_LINEAR, TIME_CUBIC]) } else { from.time };
     to.space = if step.space { other(from.space, [SPACE_LINEAR, SPACE_CUBIC]) } else { from.space };

@@ -214,7 +214,7 @@ impl Search<'_> {
         let (mut keys, mut exceeded) = (Vec::<Keys>::new(), None);
         for mut settings in self.grids(asked) {
             self.say(IMAGES + keys.len(), steps);
-            settings.coding.lambda = BUDGET_LAMBDA;
+            settings.coding = settings.coding.worth(BUDGET_LAMBDA);
             // The last grid's error is about this one's, and a little more.
             settings.error = self.prunes(keys.last().map_or(0.0, |keys| keys.error));
             let Some(Encoded { bundle, .. }) = possible(self.encode(flat, &settings), &mut exceeded)? else { continue };

@@ -36,6 +36,15 @@ pub struct CodingSettings {
     pub independent_every: usize,
 }
 
+impl CodingSettings {
+    /// The same where a bit is worth `lambda`, in steps as coarse as lose no more than that does.
+    #[must_use]
+    pub(crate) fn worth(self, lambda: f32) -> Self {
+        let coarser = [0.02, 0.06, 0.6].into_iter().take_while(|&least| lambda >= least);
+        Self { lambda, step_log2: coarser.count() as u8, ..self }
+    }
+}
+
 /// What goes into a bundle besides the keys.
 #[derive(Clone, Copy, Debug)]
 pub struct Header<'a> {
