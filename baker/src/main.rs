@@ -2,6 +2,7 @@
 //! The command line comes from `cli`, files are written by `files`; the exit code is 0, 1 (the input is at fault), 2 (usage)
 //! or 130 (interrupted).
 
+mod choices;
 mod cli;
 mod diagnostics;
 

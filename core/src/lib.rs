@@ -91,6 +91,7 @@
 )]
 
 mod atlas;
+mod bounds;
 mod bundle;
 pub mod coder;
 mod coverage;

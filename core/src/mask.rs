@@ -4,7 +4,7 @@
 //! Most of a picture is all covered or not at all, and alike elsewhere: the mask is made of blocks of 8 by 8 bits, each different one once, and tiles
 //! that say which one stands where.
 
-use crate::coverage::Bounds;
+use crate::bounds::Bounds;
 use crate::fixed::{PLAY_BITS, PlayUv};
 
 /// A block is 2^this bits wide and high.

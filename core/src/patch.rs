@@ -2,7 +2,7 @@
 //! of pixels, and down a column, they go by a first and a second difference. Layers come from `row`; `span`, `window` and `torn` ask for rows of
 //! pixels, tiles and bounds.
 
-use crate::coverage::Bounds;
+use crate::bounds::Bounds;
 use crate::fixed::PlayUv;
 use crate::form::Form;
 use crate::sheet::{Rows, Sheet};

@@ -2,7 +2,8 @@
 //! from `plan`; pixels go to the caller's row.
 
 use crate::atlas::Texture;
-use crate::coverage::{Bounds, Chart, Cover};
+use crate::bounds::Bounds;
+use crate::coverage::{Chart, Cover};
 use crate::fixed::PlayUv;
 use crate::form::Form;
 use crate::window::{Line, Tile, fraction};

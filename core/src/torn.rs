@@ -2,7 +2,8 @@
 //! Sheets come from `site`, tests from `coverage` and `span`; `plan` asks, `draw` paints what comes out.
 
 use crate::atlas::Texture;
-use crate::coverage::{Bounds, Cover};
+use crate::bounds::Bounds;
+use crate::coverage::Cover;
 use crate::form::Form;
 use crate::format::MAX_SHEETS;
 use crate::lists::{CHART, FIELD};

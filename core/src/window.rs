@@ -1,7 +1,7 @@
 //! Windows: so many rows of the source image that a position in them is one 32-bit number. What is drawn is stepped in tiles of such positions,
 //! which come from a block's patch; `plan` and `torn` make them, `span` draws them.
 
-use crate::coverage::Bounds;
+use crate::bounds::Bounds;
 use crate::form::rounded;
 use crate::key::BACKDROP;
 use crate::patch::Patch;
