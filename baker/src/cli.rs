@@ -146,7 +146,7 @@ pub struct Bake {
     /// What a bit of the keys is worth, auto or 0 to 100: more takes fewer bytes at less quality.
     ///
     /// Auto takes 0.01, 0.05, 0.2 or 1, the coarsest that pays: halving the keys' bytes may cost 1.55 dB. Rough land is as good at 1; a flat
-    /// picture of fine stripes needs 0.01. Searches (--budget, --psnr) choose on their own.
+    /// picture of fine stripes needs 0.01. Then it takes steps twice to eight times as coarse as positions are stored in, likewise. Searches (--budget, --psnr) choose on their own.
     #[arg(long, value_name = "WORTH", value_parser = lambda, default_value = "auto")]
     pub lambda: Worth,
     /// Which of the surfaces that a cell sees it keeps.

@@ -177,15 +177,17 @@ impl Plane for Nibbles<'_> {
 }
 
 /// Which of the texels of row `row` belong to a chart, as far as the bit of the `mask` to the right of their middle and below it knows; all without a mask.
+#[inline(never)]
 fn covered(mask: &Mask<'_>, row: usize, known: &mut [u8]) {
     if mask.tiles.is_empty() {
         return known.fill(0xff);
     }
-    let middle = (1 << PLAY_BITS) >> 1;
-    let at = |texel: usize| (texel as i32).wrapping_shl(PLAY_BITS) | middle;
-    for (first, eight) in (0..).step_by(8).zip(known) {
-        let bit = |k: usize| u8::from(mask.covers(PlayUv { u: at(first | k), v: at(row) })) << (k & 7);
-        *eight = (0..8).fold(0, |bits, k| bits | bit(k));
+    known.fill(0);
+    let at = |texel: usize| (texel as i32).wrapping_shl(PLAY_BITS) | (1 << PLAY_BITS) >> 1;
+    for texel in 0..1usize.wrapping_shl(mask.shape.width_log2) {
+        if let Some(eight) = known.get_mut(texel >> 3) {
+            *eight |= u8::from(mask.covers(PlayUv { u: at(texel), v: at(row) })) << (texel & 7);
+        }
     }
 }
 
@@ -283,6 +285,8 @@ const BITS: usize = 1 << 10;
 const NEW: usize = 4;
 
 /// Codes the mask, tile by tile: which block stands there, and where that is a new one its bits.
+// Seldom, and long: so are the others that say so.
+#[inline(never)]
 fn code_mask<B: Bits>(bits: &mut B, contexts: &mut [Probability], picture: &mut Picture<'_>) {
     let Picture { shape, tiles, blocks, .. } = picture;
     let Some((contexts, kinds)) = contexts.split_at_mut_checked(BITS) else { return };
@@ -296,19 +300,17 @@ fn code_mask<B: Bits>(bits: &mut B, contexts: &mut [Probability], picture: &mut 
         let (west, north) = (if column == 0 { PLAINS[1] } else { number(1) }, number(width));
         let wanted = u16::from_le_bytes(*own);
         let class = |number: u16| usize::from(number.min(2));
-        let mut told = |bits: &mut B, way: usize, is: bool| {
-            let context = way.wrapping_mul(9).wrapping_add(class(west).wrapping_mul(3)).wrapping_add(class(north));
-            coded(bits, kinds, context, is)
-        };
+        let around = class(west).wrapping_mul(3).wrapping_add(class(north));
         let tried = [west, north, PLAINS[0], PLAINS[1]];
         let mut like = tried.iter().enumerate().filter(|&(way, candidate)| !tried.iter().take(way).any(|before| before == candidate));
-        let found = like.find(|&(way, &candidate)| told(bits, way, candidate == wanted)).map(|(_, &candidate)| candidate);
+        let found = like.find(|&(way, &candidate)| told(bits, kinds, [way, around], candidate == wanted)).map(|(_, &candidate)| candidate);
         let found = found.unwrap_or_else(|| {
-            if known < blocks.len() && told(bits, NEW, usize::from(wanted) == known) {
+            if known < blocks.len() && told(bits, kinds, [NEW, around], usize::from(wanted) == known) {
                 let (before, rest) = blocks.split_at_mut(known);
                 if let Some(block) = rest.first_mut() {
                     let place = [column, at.wrapping_shr(shape.row_log2())].map(|tile| (tile << BLOCK_LOG2) as u32);
-                    code_block(bits, contexts, &Mask { tiles: done, blocks: before, shape: *shape }, place, block);
+                    let mask = Mask { tiles: done, blocks: before, shape: *shape };
+                    *block = Before { mask, block: PLAIN[1], place }.code(bits, contexts, *block);
                 }
                 known = known.wrapping_add(1);
                 return known.wrapping_sub(1) as u16;
@@ -321,30 +323,56 @@ fn code_mask<B: Bits>(bits: &mut B, contexts: &mut [Probability], picture: &mut 
     blocks.get_mut(known..).unwrap_or(&mut []).fill(PLAIN[1]);
 }
 
-/// Codes the block whose first bit is `place`, where `mask` is known above it and to the left: each bit by the two to its left, the five above these and
-/// the three above those.
-fn code_block<B: Bits>(bits: &mut B, contexts: &mut [Probability], mask: &Mask<'_>, [left, top]: [u32; 2], block: &mut Block) {
-    let columns = 1u32.wrapping_shl(mask.shape.row_log2().wrapping_add(BLOCK_LOG2));
-    let mut own: Block = [0; 8];
-    for (y, wanted) in (0u32..).zip(*block) {
-        for x in 0..8u32 {
-            // A bit so much to the right and so far above; none beyond the picture, nor where none is coded.
-            let bit = |right: u32, above: u32| {
-                let (x, y) = (x.wrapping_add(right), y.wrapping_sub(above));
-                let inside = own.get(y as usize).filter(|_| x < 8).map(|row| row >> x & 1 == 1);
-                let at = [left.wrapping_add(x), top.wrapping_add(y)];
-                usize::from(inside.unwrap_or_else(|| at[0] < columns && at[1] < u32::MAX >> 1 && mask.bit(at)))
-            };
-            let back = |by: u32| by.wrapping_neg();
-            let places = [(back(1), 2), (0, 2), (1, 2), (back(2), 1), (back(1), 1), (0, 1), (1, 1), (2, 1), (back(2), 0), (back(1), 0)];
-            let context = places.iter().fold(0, |context, &(right, above)| context << 1 | bit(right, above));
-            let covered = coded(bits, contexts, context, wanted >> x & 1 == 1);
-            if let Some(row) = own.get_mut(y as usize) {
-                *row |= u8::from(covered) << x;
+/// Codes whether what stands at a tile is told this `way`, given what stands `around` it.
+#[inline(never)]
+fn told<B: Bits>(bits: &mut B, kinds: &mut [Probability], [way, around]: [usize; 2], is: bool) -> bool {
+    coded(bits, kinds, way.wrapping_mul(9).wrapping_add(around), is)
+}
+
+/// What of a mask is coded before a bit: the tiles before its block, and the block's own bits so far.
+struct Before<'m> {
+    mask: Mask<'m>,
+    block: Block,
+    /// The block's first bit.
+    place: [u32; 2],
+}
+
+impl Before<'_> {
+    /// The bit in column `x` and row `y`, counted from the block's; 0 where none is coded, and beyond the picture.
+    #[inline(never)]
+    fn bit(&self, x: u32, y: u32) -> usize {
+        if let Some(row) = self.block.get(y as usize).filter(|_| x < 8) {
+            return usize::from(row >> x & 1);
+        }
+        let [left, top] = self.place;
+        let at = [left.wrapping_add(x), top.wrapping_add(y)];
+        // What is to the left of the picture or above it comes to more than its size.
+        let inside = at[0] >> BLOCK_LOG2 >> self.mask.shape.row_log2() == 0 && at[1] < u32::MAX >> 1;
+        usize::from(inside && self.mask.bit(at))
+    }
+
+    /// Codes the block, which is to be `wanted` where bits are written: each bit by the two to its left, the five above these and the three above those.
+    #[inline(never)]
+    fn code<B: Bits>(mut self, bits: &mut B, contexts: &mut [Probability], wanted: Block) -> Block {
+        for (y, wanted) in (0u32..).zip(wanted) {
+            for x in 0..8u32 {
+                let mut context = 0;
+                for (above, from, to) in [(2u32, 1u32, 1u32), (1, 2, 2), (0, 2, 0)] {
+                    let end = x.wrapping_add(to).wrapping_add(u32::from(above > 0));
+                    let mut at = x.wrapping_sub(from);
+                    while at != end {
+                        context = context << 1 | self.bit(at, y.wrapping_sub(above));
+                        at = at.wrapping_add(1);
+                    }
+                }
+                let covered = coded(bits, contexts, context, wanted >> x & 1 == 1);
+                if let Some(row) = self.block.get_mut(y as usize) {
+                    *row |= u8::from(covered) << x;
+                }
             }
         }
+        self.block
     }
-    *block = own;
 }
 
 /// What is known around a texel.
