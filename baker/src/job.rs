@@ -214,8 +214,9 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
         }
         whole = Some(Whole { settings: baked.settings, memory, psnr: baked.report.quality.psnr_mean });
     }
-    // What outlines need of it, flash has.
+    // What outlines need of it, flash has. Only where nothing is searched for are finer ones tried.
     let outline = whole.map_or(options.source.outline, |whole| whole.settings.atlas.outline);
+    let outline = if options.goal == Goal::AsSet { outline } else { outline.or(Some(0)) };
     let options = &Options { source: atlas::Settings { outline, ..options.source }, ..*options };
     let choice_seconds = start.elapsed().as_secs_f64();
     let settings = options.settings(scene.playback.width);
@@ -238,8 +239,7 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
     let quality = verify::briefly(&encoded.bundle, &flat.atlas.image, &flat.atlas.gbuffer)?;
     let free = options.goal == Goal::AsSet && options.cell.is_none() && options.key_interval.is_none();
     let made = Made { settings, encoded, quality };
-    let sharp = options.goal == Goal::AsSet;
-    let (made, outlines) = if sharp { outlines::choose(scene, &mut flat, made, progress)? } else { (made, Vec::new()) };
+    let (made, outlines) = outlines::choose(scene, &mut flat, made, progress)?;
     let all = made.quality;
     // Searches have left out what they could.
     let prunes = !options.all_sheets && options.goal == Goal::AsSet;

@@ -196,6 +196,12 @@ impl<'a> Bundle<'a> {
         self.mask
     }
 
+    /// Tiles of the mask; 0: there is none.
+    #[must_use]
+    pub fn mask_tiles(&self) -> usize {
+        if self.masked() { self.mask.shape.tiles() } else { 0 }
+    }
+
     /// Different blocks of the mask; 0: there is none.
     #[must_use]
     pub fn mask_blocks(&self) -> usize {
@@ -266,14 +272,13 @@ fn check_labels<'a>(labels: &[[u8; LABEL_BYTES]], atlas: &Atlas<'_>, mask: &'a [
         // The backdrop is all of its rectangle, and there is one.
         field(!label.fixed() || index == 0 && label.flags & MASKED == 0, "LABL flags", u32::from(label.flags))?;
     }
-    // A packed picture brings its mask along.
-    let width_log2 = atlas.width_log2.into();
+    let shape = Shape { width_log2: atlas.width_log2.into(), height: atlas.height.into(), finer: 0 };
     if !masked {
-        return Ok(Mask { shape: Shape { width_log2, height: atlas.height.into(), finer: 0 }, ..Mask::default() });
+        return Ok(Mask { shape, ..Mask::default() });
     }
     field(atlas.finer <= MOST_FINER, "ATLS finer", u32::from(atlas.finer))?;
     field((PLAIN.len() as u32..=MOST_BLOCKS).contains(&atlas.blocks), "ATLS blocks", atlas.blocks)?;
-    let shape = Shape { width_log2, height: atlas.height.into(), finer: atlas.finer.into() };
+    let shape = Shape { finer: atlas.finer.into(), ..shape };
     // A packed picture brings its mask along.
     if packs(atlas) {
         return Ok(Mask { shape, ..Mask::default() });

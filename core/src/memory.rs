@@ -91,7 +91,7 @@ fn picture<'m>(
     let (kind, width_log2) = (bundle.texel_kind(), texture.width_log2);
     let texels = cutter.take(kind.bytes(bundle.texel_count()));
     let mask = texture.mask;
-    let tiles = cutter.take::<mask::Tile>(if bundle.masked() { mask.shape.tiles() } else { 0 });
+    let tiles = cutter.take::<mask::Tile>(bundle.mask_tiles());
     let blocks = cutter.take::<Block>(bundle.mask_blocks());
     // What unpacking needs lies where playback's own memory will.
     let mut rest = Cutter { rest: &mut *cutter.rest, words: cutter.words, unpacking: 0 };

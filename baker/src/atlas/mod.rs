@@ -169,19 +169,23 @@ impl SourceImage {
     /// Whether a position lies inside the outline; outside the image the nearest one that is in it.
     #[inline]
     #[must_use]
-    pub fn covered_at(&self, [u, v]: [f32; 2]) -> bool {
-        let Outline { finer, bits } = &self.outline;
-        let scale = (1 << finer) as f32;
-        let (x, y) = (((u * scale) as u32).min((self.width << finer) - 1), ((v * scale) as u32).min((self.height << finer) - 1));
-        bits[((y * self.width) << finer) as usize + x as usize]
+    pub fn covered_at(&self, uv: [f32; 2]) -> bool {
+        self.outline.bits[self.place_of(uv, self.outline.finer)]
     }
 
     /// The index of the texel at a position, texels; outside the image that of the nearest texel.
     #[inline]
-    pub(crate) fn place(&self, [u, v]: [f32; 2]) -> usize {
+    pub(crate) fn place(&self, uv: [f32; 2]) -> usize {
+        self.place_of(uv, 0)
+    }
+
+    /// Likewise of what 2^`finer` are as wide and as high as a texel.
+    #[inline]
+    fn place_of(&self, uv: [f32; 2], finer: u32) -> usize {
+        let [width, height] = [self.width, self.height].map(|texels| texels << finer);
         // What is below zero comes to zero.
-        let (x, y) = ((u as u32).min(self.width - 1), (v as u32).min(self.height - 1));
-        (y * self.width + x) as usize
+        let [u, v] = uv.map(|at| (at * (1 << finer) as f32) as u32);
+        (v.min(height - 1) * width + u.min(width - 1)) as usize
     }
 }
 
@@ -273,7 +277,6 @@ pub(crate) fn of_charts(
     let fill = filled.covered.iter().filter(|&&c| c).count() as f64 / filled.covered.len().max(1) as f64;
     let figures =
         Figures { charts: charting.charts.len(), halved, labels: labels.len(), crowded, fill, scale: layout.scale, gutter: layout.gutter };
-    progress(4, 4);
     let outlined = |finer: u32| outline::outline(scene, &charting, &layout, &gbuffer, &filled.covered, finer);
     let masked = labels.iter().any(|label| label.masked);
     let finer: Vec<Outline> = match settings.outline {
@@ -285,6 +288,7 @@ pub(crate) fn of_charts(
     let outline = asked.unwrap_or_else(|| Outline { finer: 0, bits: filled.covered.clone() });
     let (width, height) = (layout.width, layout.height);
     let image = SourceImage { width, height, kind, texels, palette, covered: filled.covered, outline, labels };
+    progress(4, 4);
     Ok(Atlas { image, finer, gbuffer, figures })
 }
 

@@ -74,12 +74,6 @@ impl Unpacked {
     pub fn bytes(&self) -> usize {
         self.texels.len() + self.tiles.as_flattened().len() + self.blocks.as_flattened().len()
     }
-
-    /// The mask, as the player asks it.
-    #[must_use]
-    pub fn mask(&self) -> Mask<'_> {
-        Mask { tiles: &self.tiles, blocks: &self.blocks, shape: self.shape }
-    }
 }
 
 /// The source image of a bundle, unpacked where it is packed.
@@ -90,7 +84,7 @@ pub fn unpacked(bundle: &Bundle<'_>) -> Unpacked {
         return Unpacked { texels: bundle.atlas().texels.to_vec(), tiles: tiles.to_vec(), blocks: blocks.to_vec(), shape };
     };
     let mut texels = vec![0; bundle.texel_kind().bytes(bundle.texel_count())];
-    let mut tiles = vec![Tile::default(); if bundle.masked() { shape.tiles() } else { 0 }];
+    let mut tiles = vec![Tile::default(); bundle.mask_tiles()];
     let mut blocks = vec![Block::default(); bundle.mask_blocks()];
     let picture = Picture { shape, texels: &mut texels, tiles: &mut tiles, blocks: &mut blocks };
     code(&mut Decoder::new(packed), bundle.texel_kind(), picture);
