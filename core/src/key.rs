@@ -7,6 +7,7 @@ use crate::format::LabelRecord;
 use crate::grid::Grid;
 use crate::lists::{Lists, Sheets};
 use crate::plane::{PLANE_BYTES, View};
+use core::ops::Range;
 
 /// No place.
 pub const NONE: u16 = u16::MAX;
@@ -155,12 +156,45 @@ impl<'k> Line<'k> {
         let along = self.along(column)?;
         (self.chain.field != NONE).then(|| usize::from(self.chain.field).wrapping_add(usize::from(along)))
     }
+
+    /// The first layer at nodes of these `columns`, none of which is to the left of the last one that was asked for.
+    #[inline(always)]
+    pub fn first_in(&mut self, columns: Range<u16>) -> Option<usize> {
+        self.along(columns.start);
+        let column = columns.start.max(self.chain.first);
+        if column < columns.end { self.layer(column) } else { None }
+    }
+}
+
+/// What the positions of a chain are told from. A layer that this has no answer for is told from those around it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Base {
+    /// The layers to the west and north.
+    #[default]
+    Around,
+    /// Where the camera sees the plane of the label.
+    Plane,
+    /// The same, and how far off that was around.
+    PlaneCorrected,
+    /// Where the layers were in the two keys before.
+    Time,
+    /// The same, and how far off that was around.
+    TimeCorrected,
+}
+
+impl Base {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::Around, Self::Plane, Self::PlaneCorrected, Self::Time, Self::TimeCorrected];
 }
 
 /// What an encoder knows; a decoder's [`Nothing`] gives answers that are ignored.
 pub trait Source {
     /// The sheets of `cell` in the interval that starts (`ahead`) or ends at the key.
     fn sheets(&mut self, ahead: bool, cell: usize) -> Sheets;
+
+    /// What to tell the positions of a chain from; `expected` is the cheapest to say. `trial` goes through them as told from some base, asking for their
+    /// residuals, and writes nothing.
+    fn base(&mut self, expected: Base, trial: impl FnMut(&mut Self, Base)) -> Base;
 
     /// The residual to code, in steps along u and v, for the layer of `label` at `node` whose `predicted` position is in
     /// stored units. `contexts` tell what residuals cost.
@@ -177,6 +211,10 @@ pub struct Nothing;
 impl Source for Nothing {
     fn sheets(&mut self, _: bool, _: usize) -> Sheets {
         Sheets::default()
+    }
+
+    fn base(&mut self, expected: Base, _: impl FnMut(&mut Self, Base)) -> Base {
+        expected
     }
 
     fn residual(&mut self, _: usize, _: u8, _: [i32; 2], _: [&[Probability]; 2]) -> [i32; 2] {

@@ -15,7 +15,7 @@ use cubist_core::format::{
     ATLAS, Atlas, Envelope, FIXED, INFO, KeyEntry, LABELS, LabelRecord, Limits, MAGIC, MASK, MASKED, PACKED, PATH, Path, RAW, STRIP,
     Section, TexelKind, VERSION,
 };
-use cubist_core::key::{Chain, Key, Source};
+use cubist_core::key::{Base, Chain, Key, Source};
 use cubist_core::lists::{self, Lists};
 use cubist_core::nodes::{self, Layout, Mark, Trace};
 use cubist_core::plane::{CAMERA_BYTES, Camera, PLANE_BYTES, Plane, View};
@@ -229,7 +229,7 @@ fn keys(
             lengths: [grid.length(position as isize - 1), grid.length(position as isize - 2)],
             camera: content.cameras.get(position).copied().unwrap_or_default(),
         };
-        let mut source = Wanted { content, settings, key: position };
+        let mut source = Wanted { content, settings, key: position, price: 0.0 };
         let mut encoder = Encoder::default();
         stream.code(&mut encoder, shape, place, &mut source);
         if let Some(key) = stream.key(0) {
@@ -297,7 +297,12 @@ struct Wanted<'a> {
     content: &'a Content<'a>,
     settings: CodingSettings,
     key: usize,
+    /// What residuals cost so far: bits, and what they are off in as many.
+    price: f64,
 }
+
+/// What it costs to tell a chain that its base is another than expected, bits.
+const OTHER_BASE: f64 = 3.0;
 
 impl Source for Wanted<'_> {
     fn sheets(&mut self, ahead: bool, cell: usize) -> lists::Sheets {
@@ -313,6 +318,18 @@ impl Source for Wanted<'_> {
         layer.map_or(0, |layer| fields::code(self.content.fields.distance[layer][which]))
     }
 
+    fn base(&mut self, expected: Base, mut trial: impl FnMut(&mut Self, Base)) -> Base {
+        let mut best = (f64::INFINITY, expected);
+        for base in Base::ALL {
+            self.price = if base == expected { 0.0 } else { OTHER_BASE };
+            trial(self, base);
+            if self.price < best.0 {
+                best = (self.price, base);
+            }
+        }
+        best.1
+    }
+
     fn residual(&mut self, node: usize, label: u8, predicted: [i32; 2], contexts: [&[Probability]; 2]) -> [i32; 2] {
         let Some(layer) = self.content.layers.find(self.key * self.content.grid.grid.nodes() + node, label) else { return [0, 0] };
         let unit = (1u32 << key_bits(self.content.image)) as f32;
@@ -322,23 +339,27 @@ impl Source for Wanted<'_> {
             let wanted = self.content.fit.uv[layer][axis].clamp(KEY_MIN as f32 / unit, KEY_MAX as f32 / unit);
             let exact = (wanted - predicted[axis] as f32 / unit) / step;
             let nearest = libm::roundf(exact) as i32;
-            residual[axis] = nearest;
-            if self.settings.lambda <= 0.0 || nearest == 0 {
-                continue;
-            }
             // What the exact value gains the pixels that look at the layer is weighed against its bits; ghosts have few such pixels.
+            let lambda = self.settings.lambda;
             let cost = |value: i32| {
                 let error = (value as f32 - exact) * step;
-                self.content.fit.weight[layer] * error * error + self.settings.lambda * range::price(contexts[axis], value) as f32
+                self.content.fit.weight[layer] * error * error + lambda * range::price(contexts[axis], value) as f32
             };
+            if lambda <= 0.0 {
+                residual[axis] = nearest;
+                self.price += range::price(contexts[axis], nearest);
+                continue;
+            }
             let mut best = (cost(nearest), nearest);
-            for value in [nearest - nearest.signum(), nearest / 2, 0] {
+            let coarser = [nearest - nearest.signum(), nearest / 2, 0];
+            for value in coarser.into_iter().filter(|_| nearest != 0) {
                 let candidate = (cost(value), value);
                 if candidate.0 < best.0 {
                     best = candidate;
                 }
             }
             residual[axis] = best.1;
+            self.price += f64::from(best.0 / lambda);
         }
         residual
     }
