@@ -1,6 +1,6 @@
 //! Planes: where a flat surface's chart lies in space, and from where a key looks at it. Both together tell a layer's position, but for what
 //! the fit has moved: a plane's picture on the screen is a homography.
-//! Both come from the bundle; `predict` offers what they tell as one more prediction.
+//! Both come from the bundle; `predict` tells chains from them that say so.
 //!
 //! A point of the plane is O + u A + v B; the ray from the eye E through a node goes along D. With C = E - O they meet at
 //! u = D (C x B) / D (A x B), v = D (A x C) / D (A x B): for a key that is a linear function of the node's place over another.
