@@ -63,7 +63,8 @@ impl Plan<'_> {
         // The last strip may have been planned for pixels that are told from fewer texels.
         self.near = room.map_or(0, |room| room.known(self.near));
         let blocks = 1u32.wrapping_shl(site.log2().wrapping_sub(log2));
-        let mut across = Across { site, room, strip, log2, blocks, width: site.bundle.size().0, left: 0, block: 0 };
+        let [_, down] = site.offset(0, strip);
+        let mut across = Across { site, room, down, log2, blocks, width: site.bundle.size().0, left: 0, block: 0 };
         for &stretch in site.sheets.stretches() {
             match site.sheets.of(stretch) {
                 [sheet] => self.smooth(&mut across, stretch, sheet),
@@ -136,7 +137,7 @@ impl Plan<'_> {
     fn extend(&mut self, across: &Across<'_, '_, '_>, sheet: &Sheet, along: u16, most: usize) -> u16 {
         let Some(room) = &across.room else { return 0 };
         let ([top, bottom], [above, below]) = (across.site.rows, sheet.further(along).nodes().map(usize::from));
-        let cells = Cells { room, label: sheet.label(), low: across.offset()[1] > 0, most, near: self.near };
+        let cells = Cells { room, label: sheet.label(), low: across.down > 0, most, near: self.near };
         let bends = [top.node.get(above..).unwrap_or(&[]), bottom.node.get(below..).unwrap_or(&[])];
         let flat = [top.layer.get(above..).unwrap_or(&[]), bottom.layer.get(below..).unwrap_or(&[])];
         match (across.site.log2(), across.site.straight()) {
@@ -196,14 +197,23 @@ impl Plan<'_> {
     /// Makes side `side` the tile of its block, drawn all over it before the other sides are drawn over that; none: it has only sides.
     #[inline(always)]
     fn base(&mut self, site: &Site<'_, '_, '_>, side: Option<usize>) {
-        let Some(most) = side.and_then(|side| self.side.get_mut(side)) else { return self.put(Tile::NONE) };
-        let tile = most.tile;
+        let Some((most, slot)) = side.and_then(|side| self.side.get_mut(side)).zip(self.tile.get_mut(self.tiles)) else {
+            return self.put(Tile::NONE);
+        };
         most.shown = Shown::NONE;
         // Seldom it is none of the last ones: to move others would take longer than to pass it by.
         if side == Some(self.sides.wrapping_sub(1)) {
             self.sides = self.sides.wrapping_sub(1);
         }
-        if site.plain(tile.label) { self.plain(1) } else { self.put(tile) }
+        let Tile { row, label, .. } = most.tile;
+        if site.plain(label) {
+            self.plain(1);
+        } else {
+            // Number by number: it would be moved by a call.
+            *slot = most.tile.of(label, row);
+            self.near = row;
+            self.tiles = self.tiles.wrapping_add(1);
+        }
     }
 
     /// Appends the block at `across`, which shows one sheet; false where its positions fit no window.
@@ -214,7 +224,7 @@ impl Plan<'_> {
             return true;
         }
         let Some(room) = &across.room else { return false };
-        let patch = across.site.block(&across.site.cell(sheet), across.offset());
+        let patch = across.site.block(sheet, across.offset());
         let Some(row) = room.row(&patch.bounds(), self.near) else { return false };
         self.put(room.window.tile(&patch, sheet.label(), row, across.log2));
         true
@@ -364,7 +374,8 @@ fn lay_across<const TILES: usize, T: Place>(slots: &mut [[Tile; TILES]], [above,
 struct Across<'s, 'a, 'm> {
     site: &'s Site<'s, 'a, 'm>,
     room: Option<Room>,
-    strip: u32,
+    /// How far the strip is from its cells' upper edge, pixels.
+    down: u32,
     /// A block is 2^this pixels wide.
     log2: u32,
     /// Blocks of a cell, from left to right.
@@ -379,7 +390,8 @@ struct Across<'s, 'a, 'm> {
 impl Across<'_, '_, '_> {
     /// How far the next block is from its cell's left upper corner, pixels.
     fn offset(&self) -> [u32; 2] {
-        self.site.offset(self.block, self.strip)
+        // As many blocks as a cell has are a power of two.
+        [(self.block & self.blocks.wrapping_sub(1)).wrapping_shl(self.log2), self.down]
     }
 
     /// On by so many blocks.

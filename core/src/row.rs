@@ -463,20 +463,18 @@ impl NodeRow<'_> {
         self.field.get(usize::from(index)..).and_then(<[_]>::first_chunk).copied().unwrap_or([[1, 1]; 2])
     }
 
-    /// Layer `index` and the next one of its chain, and the sums of their second differences, across and down.
+    /// The numbers of layer `index` and of the next one of its chain, as [`Node`] has them, where space is cubic,
     #[must_use]
     #[inline(always)]
-    pub fn ends(&self, index: u16) -> [PlayUv; 4] {
-        let none = PlayUv::default();
-        let index = usize::from(index);
-        if let Some([left, right]) = self.node.get(index..).and_then(<[_]>::first_chunk) {
-            let sum = |a: Layer, b: Layer| a.uv().plus(b.uv());
-            return [left.layer.uv(), right.layer.uv(), sum(left.across, right.across), sum(left.down, right.down)];
-        }
-        match self.layer.get(index..).and_then(<[_]>::first_chunk) {
-            Some([left, right]) => [left.uv(), right.uv(), none, none],
-            None => [none; 4],
-        }
+    pub fn nodes(&self, index: u16) -> Option<&[i32; 12]> {
+        self.node.get(usize::from(index)..)?.first_chunk::<2>().map(bytemuck::cast_ref)
+    }
+
+    /// and as [`Layer`] has them, where it is linear.
+    #[must_use]
+    #[inline(always)]
+    pub fn layers(&self, index: u16) -> Option<&[i32; 4]> {
+        self.layer.get(usize::from(index)..)?.first_chunk::<2>().map(bytemuck::cast_ref)
     }
 }
 

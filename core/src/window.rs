@@ -168,9 +168,8 @@ impl Window {
     /// [`Window::tile`], written out where the window and `log2` are known.
     #[inline(always)]
     fn packed(self, patch: &Patch, row: u16, log2: u32) -> Tile {
-        // Each by name: a map over both would be a call.
-        let [(corners, sums), (corners_v, sums_v)] = patch.axes();
-        let (u, v) = (Middle::new(corners, sums, log2), Middle::new(corners_v, sums_v, log2));
+        let Patch { u, v } = patch;
+        let (u, v) = (Middle::new(u.corners, u.sums, log2), Middle::new(v.corners, v.sums, log2));
         let first = i32::from(row).wrapping_shl(16);
         let v = v.plus(first.wrapping_neg()).lanes(log2, |x, log2| self.lane::<true>(x, log2));
         v.plus(&u.lanes(log2, |x, log2| self.lane::<false>(x, log2))).from_middle(log2)
