@@ -164,29 +164,36 @@ impl Plan<'_> {
         done as u16
     }
 
-    /// Plans the block at `across`, of a cell of `sheets`: by sides, of which the one that most pixels show becomes its tile; where it has none, pixel by
-    /// pixel, as `mixed` says.
+    /// Plans the block at `across`, of a cell of `sheets`: by sides, or else by a tile alone, or pixel by pixel, as `mixed` says.
+    #[inline(always)]
     fn block(&mut self, across: &Across<'_, '_, '_>, sheets: &[Sheet], mixed: Mixed) {
-        let (site, offset) = (across.site, across.offset());
-        let tests = |sheets: u32| {
-            let pixels = across.width.saturating_sub(across.left).min(1 << across.log2);
-            pixels.wrapping_mul(sheets.saturating_sub(1))
-        };
-        let free = self.side.get_mut(self.sides..).unwrap_or(&mut []);
-        let room = across.room.as_ref().filter(|_| !self.sideless);
-        if let Some(share) = room.and_then(|room| torn::share(site, across.block, offset, sheets, (room, self.near), free)) {
-            self.tests = self.tests.wrapping_add(tests(share.sheets));
-            let first = self.sides;
-            self.sides = first.wrapping_add(share.sides);
-            self.base(site, share.most.map(|most| first.wrapping_add(most)));
-            return;
+        if !self.share(across, sheets) {
+            self.other(across, sheets, mixed);
         }
-        let shown = torn::candidates(site, offset, sheets);
+    }
+
+    /// Plans the block by sides, of which the one that most pixels show becomes its tile; false where it has none.
+    #[inline(never)]
+    fn share(&mut self, across: &Across<'_, '_, '_>, sheets: &[Sheet]) -> bool {
+        let Some(room) = across.room.as_ref().filter(|_| !self.sideless) else { return false };
+        let (site, first) = (across.site, self.sides);
+        let free = self.side.get_mut(first..).unwrap_or(&mut []);
+        let Some(share) = torn::share(site, across.block, across.offset(), sheets, (room, self.near), free) else { return false };
+        self.tests = self.tests.wrapping_add(across.tests(share.sheets));
+        self.sides = first.wrapping_add(share.sides);
+        self.base(site, share.most.map(|most| first.wrapping_add(most)));
+        true
+    }
+
+    /// Plans the block without sides.
+    #[inline(never)]
+    fn other(&mut self, across: &Across<'_, '_, '_>, sheets: &[Sheet], mixed: Mixed) {
+        let shown = torn::candidates(across.site, across.offset(), sheets);
         let single = sheets.get(shown.trailing_zeros() as usize).filter(|_| shown.is_power_of_two());
         if single.is_some_and(|sheet| self.append(across, sheet)) {
             return;
         }
-        self.tests = self.tests.wrapping_add(tests(shown.count_ones()));
+        self.tests = self.tests.wrapping_add(across.tests(shown.count_ones()));
         self.put(Tile::NONE);
         if let Some(slot) = self.mixed.get_mut(self.mixes) {
             *slot = Mixed { block: across.block as u16, sheets: shown, ..mixed };
@@ -226,7 +233,11 @@ impl Plan<'_> {
         let Some(room) = &across.room else { return false };
         let patch = across.site.block(sheet, across.offset());
         let Some(row) = room.row(&patch.bounds(), self.near) else { return false };
-        self.put(room.window.tile(&patch, sheet.label(), row, across.log2));
+        if let Some(slot) = self.tile.get_mut(self.tiles) {
+            room.window.put(slot, &patch, sheet.label(), row, across.log2);
+            self.near = row;
+            self.tiles = self.tiles.wrapping_add(1);
+        }
         true
     }
 
@@ -235,15 +246,12 @@ impl Plan<'_> {
         (0..blocks).for_each(|_| self.put(Tile::PLAIN));
     }
 
-    /// Appends a tile.
+    /// Appends a tile that is in no window.
     #[inline(always)]
     fn put(&mut self, tile: Tile) {
         if let Some(slot) = self.tile.get_mut(self.tiles) {
             *slot = tile;
             self.tiles = self.tiles.wrapping_add(1);
-            if tile.in_window() {
-                self.near = tile.row;
-            }
         }
     }
 }
@@ -392,6 +400,12 @@ impl Across<'_, '_, '_> {
     fn offset(&self) -> [u32; 2] {
         // As many blocks as a cell has are a power of two.
         [(self.block & self.blocks.wrapping_sub(1)).wrapping_shl(self.log2), self.down]
+    }
+
+    /// Coverage tests of a row of the next block, where so many of its sheets are looked at: the last is not tested.
+    fn tests(&self, sheets: u32) -> u32 {
+        let pixels = self.width.saturating_sub(self.left).min(1 << self.log2);
+        pixels.wrapping_mul(sheets.saturating_sub(1))
     }
 
     /// On by so many blocks.

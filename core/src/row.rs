@@ -316,6 +316,7 @@ pub struct NodeRow<'m> {
 impl NodeRow<'_> {
     fn clear(&mut self) {
         self.head.fill(NONE);
+        self.field.fill([0; 2]);
         self.chains = 0;
     }
 
@@ -341,7 +342,8 @@ impl NodeRow<'_> {
         self.clear();
         let Some(row) = row.filter(|&row| row < grid.node_rows()) else { return 0 };
         let [from, mut to] = [keys.from, keys.to].map(|key| Beside::of(Some(key), row));
-        let mut outer = [keys.before, keys.after].map(|key| Outer::of(key, row));
+        // At a key no other one weighs anything.
+        let mut outer = [keys.before, keys.after].map(|key| Outer::of(key.filter(|_| moment.passed > 0), row));
         let mut count = 0usize;
         for start in from.chains {
             let mut column = start.first;
@@ -379,13 +381,12 @@ impl NodeRow<'_> {
     /// Works out the fields of `chain`, which is in both `ends` of the interval: straight between them, Q8 pixels.
     #[inline(always)]
     fn distances(&mut self, chain: Chain, ends: [&Chain; 2], keys: &Around<'_, '_>, linear: i32) {
-        let slots = self.field.get_mut(usize::from(chain.at)..).unwrap_or(&mut []);
-        let slots = slots.get_mut(..chain.nodes().into()).unwrap_or(&mut []);
-        slots.fill([0; 2]);
         // Most chains are never tested, and have none.
         if ends.iter().all(|end| end.field == NONE) {
             return;
         }
+        let slots = self.field.get_mut(usize::from(chain.at)..).unwrap_or(&mut []);
+        let slots = slots.get_mut(..chain.nodes().into()).unwrap_or(&mut []);
         let [from, to] = [(keys.from, ends[0]), (keys.to, ends[1])].map(|(key, end)| {
             let first = usize::from(end.field).wrapping_add(chain.first.wrapping_sub(end.first).into());
             let [a, b] = &key.fields;

@@ -160,7 +160,8 @@ pub struct Share {
 
 /// Works out the sides of block `block`, which is so far from the left upper corner of its torn cell of `sheets`, for positions that `room` has, best in the window
 /// from row `near` on, into `slots`. `None` where positions fit no window, there is no room, or no sheet. The frontmost sheet that covers a pixel shows.
-#[inline(never)]
+// Called from one place.
+#[inline(always)]
 pub fn share(
     site: &Site<'_, '_, '_>,
     block: u32,
@@ -207,7 +208,7 @@ pub fn share(
         left = left.and_not(shown);
         let mut add = |shown: Shown, row: u16| {
             let slot = slots.get_mut(share.sides)?;
-            slot.tile = room.window.tile(&patch, sheet.label(), row, log2);
+            room.window.put(&mut slot.tile, &patch, sheet.label(), row, log2);
             (slot.shown, slot.block) = (shown, block);
             share.sides = share.sides.wrapping_add(1);
             Some(())
@@ -230,7 +231,7 @@ pub fn share(
 }
 
 /// At which pixels of a block all fields of `sheet` are above zero.
-// Beside what most sheets are tested by.
+// A function of its own: most sheets are tested by their charts, which has all registers then.
 #[inline(never)]
 fn above(site: &Site<'_, '_, '_>, sheet: &Sheet, offset: [u32; 2]) -> u64 {
     let log2 = site.block_log2();
