@@ -37,9 +37,14 @@ impl Axis {
         Self::new([a, b, c, d], [0; 2])
     }
 
-    /// Likewise between nodes.
+    /// Likewise between nodes: in a function of its own, and where it stands.
     #[inline(never)]
-    fn bent(&[a, _, e, _, g, _, b, _, f, _, h]: &[i32; 11], &[c, _, i, _, k, _, d, _, j, _, l]: &[i32; 11]) -> Self {
+    fn bent(above: &[i32; 11], below: &[i32; 11]) -> Self {
+        Self::bent_here(above, below)
+    }
+
+    #[inline(always)]
+    fn bent_here(&[a, _, e, _, g, _, b, _, f, _, h]: &[i32; 11], &[c, _, i, _, k, _, d, _, j, _, l]: &[i32; 11]) -> Self {
         let sum = |a: i32, b: i32, c: i32, d: i32| a.wrapping_add(b).wrapping_add(c.wrapping_add(d));
         Self::new([a, b, c, d], [sum(e, f, i, j), sum(g, h, k, l)])
     }
@@ -83,11 +88,24 @@ impl Patch {
     /// `sheet` in its cell between these rows of nodes; nowhere if they lack it, which does not happen.
     #[must_use]
     #[inline(always)]
-    pub fn new([top, bottom]: Rows<'_, '_>, sheet: &Sheet) -> Self {
+    pub fn new(rows: Rows<'_, '_>, sheet: &Sheet) -> Self {
+        Self::made(rows, sheet, Axis::bent)
+    }
+
+    /// The same with all code where it stands, for callers that do not ask for what lies around it.
+    #[must_use]
+    #[inline(always)]
+    pub fn new_here(rows: Rows<'_, '_>, sheet: &Sheet) -> Self {
+        Self::made(rows, sheet, Axis::bent_here)
+    }
+
+    /// The same, of coordinates that `bent` makes of nodes.
+    #[inline(always)]
+    fn made([top, bottom]: Rows<'_, '_>, sheet: &Sheet, bent: impl Fn(&[i32; 11], &[i32; 11]) -> Axis) -> Self {
         let [above, below] = sheet.nodes();
         if let Some((above, below)) = top.nodes(above).zip(bottom.nodes(below)) {
             let ([u @ .., _], [u_below @ .., _], [_, v @ ..], [_, v_below @ ..]) = (above, below, above, below);
-            return Self { u: Axis::bent(u, u_below), v: Axis::bent(v, v_below) };
+            return Self { u: bent(u, u_below), v: bent(v, v_below) };
         }
         let Some((above, below)) = top.layers(above).zip(bottom.layers(below)) else { return Self::default() };
         let ([u @ .., _], [u_below @ .., _], [_, v @ ..], [_, v_below @ ..]) = (above, below, above, below);

@@ -105,7 +105,7 @@ impl Site<'_, '_, '_> {
     #[must_use]
     #[inline(never)]
     pub fn forms(&self, sheet: &Sheet, offset: [u32; 2]) -> [Form; 2] {
-        self.cell(sheet).forms(self.log2()).map(|form| form.from(offset))
+        Patch::new_here(self.rows, sheet).forms(self.log2()).map(|form| form.from(offset))
     }
 
     /// Its field `which`, Q16 pixels: straight from edge to edge of the cell, whatever space is.
