@@ -10,7 +10,7 @@ use crate::row::{Layer, Place};
 use crate::sheet::{Sheet, Stretch};
 use crate::site::Site;
 use crate::torn::{self, Mixed, Shown, Side};
-use crate::window::{Middle, Room, Tile};
+use crate::window::{Middle, Room, Tile, Window};
 use core::slice;
 
 /// A strip's blocks, in caller's memory.
@@ -141,24 +141,26 @@ impl Plan<'_> {
         let bends = [top.node.get(above..).unwrap_or(&[]), bottom.node.get(below..).unwrap_or(&[])];
         let flat = [top.layer.get(above..).unwrap_or(&[]), bottom.layer.get(below..).unwrap_or(&[])];
         match (across.site.log2(), across.site.straight()) {
-            (3, false) => self.grow::<1, _>(&cells, bends),
-            (3, true) => self.grow::<1, _>(&cells, flat),
-            (4, false) => self.grow::<2, _>(&cells, bends),
-            (4, true) => self.grow::<2, _>(&cells, flat),
+            // What most bundles are made of has code of its own.
+            (3, false) if room.window == Window::USUAL => self.grow::<1, true, _>(&cells, bends),
+            (3, false) => self.grow::<1, false, _>(&cells, bends),
+            (3, true) => self.grow::<1, false, _>(&cells, flat),
+            (4, false) => self.grow::<2, false, _>(&cells, bends),
+            (4, true) => self.grow::<2, false, _>(&cells, flat),
             _ => 0,
         }
     }
 
     /// Appends tiles of `cells` of so many `TILES` a row of blocks, as long as each fits a window; returns of how many. The `lines` above and below start
     /// at their left corners.
-    // Windows have no code of their own: that would save a hundredth of a frame's instructions, for 4 KB.
+    // Windows other than the usual one have no code of their own: a kilobyte or more each.
     #[inline(never)]
-    fn grow<const TILES: usize, T: Place>(&mut self, cells: &Cells<'_>, lines: [&[T]; 2]) -> u16 {
+    fn grow<const TILES: usize, const USUAL: bool, T: Place>(&mut self, cells: &Cells<'_>, lines: [&[T]; 2]) -> u16 {
         let Some(slots) = self.tile.get_mut(self.tiles..).map(|slots| slots.as_chunks_mut::<TILES>().0) else { return 0 };
         let Some(slots) = slots.get_mut(..cells.most) else { return 0 };
         // An axis after the other: what is known of both at a time would not fit a small processor's registers.
-        let done = lay_down::<TILES, T>(slots, lines, cells);
-        let done = lay_across::<TILES, T>(slots.get_mut(..done).unwrap_or(&mut []), lines, cells);
+        let done = lay_down::<TILES, USUAL, T>(slots, lines, cells);
+        let done = lay_across::<TILES, USUAL, T>(slots.get_mut(..done).unwrap_or(&mut []), lines, cells);
         self.near = slots.get(done.wrapping_sub(1)).and_then(|tiles| tiles.last()).map_or(self.near, |last| last.row);
         self.tiles = self.tiles.wrapping_add(done.wrapping_mul(TILES));
         done as u16
@@ -274,6 +276,12 @@ impl Cells<'_> {
         self.room.margin.wrapping_add(BULGE)
     }
 
+    /// The kind of window, which may be known to be the `USUAL` one.
+    #[inline(always)]
+    const fn window_of<const USUAL: bool>(&self) -> Window {
+        if USUAL { Window::USUAL } else { self.room.window }
+    }
+
     /// The first row of a window for the cell whose v are these at its corners, one that has room where they are heading; `None` where none holds it.
     #[inline(never)]
     fn window(&self, [a, b, c, d]: [i32; 4]) -> Option<i32> {
@@ -310,8 +318,12 @@ fn sums<T: Place>(above: &T, below: &T, one: impl Fn(Layer) -> i32) -> [i32; 2] 
 
 /// Fills `slots` with v of the tiles of `cells` between nodes above and below, and their windows, as long as there are such; returns of how many cells.
 #[inline(always)]
-fn lay_down<const TILES: usize, T: Place>(slots: &mut [[Tile; TILES]], [above, below]: [&[T]; 2], cells: &Cells<'_>) -> usize {
-    let window = cells.room.window;
+fn lay_down<const TILES: usize, const USUAL: bool, T: Place>(
+    slots: &mut [[Tile; TILES]],
+    [above, below]: [&[T]; 2],
+    cells: &Cells<'_>,
+) -> usize {
+    let window = cells.window_of::<USUAL>();
     let v = |layer: Layer| layer.uv().v;
     let margin = cells.margin();
     // From the margin on: inside is what is not negative and below the room, one comparison for both.
@@ -347,8 +359,12 @@ fn lay_down<const TILES: usize, T: Place>(slots: &mut [[Tile; TILES]], [above, b
 
 /// Adds u to the tiles in `slots`, likewise.
 #[inline(always)]
-fn lay_across<const TILES: usize, T: Place>(slots: &mut [[Tile; TILES]], [above, below]: [&[T]; 2], cells: &Cells<'_>) -> usize {
-    let window = cells.room.window;
+fn lay_across<const TILES: usize, const USUAL: bool, T: Place>(
+    slots: &mut [[Tile; TILES]],
+    [above, below]: [&[T]; 2],
+    cells: &Cells<'_>,
+) -> usize {
+    let window = cells.window_of::<USUAL>();
     let margin = cells.margin();
     // From the margin on: inside is what is not negative and below the room, one comparison for both.
     let room = 1u32.wrapping_shl(window.width_log2.wrapping_add(16)).wrapping_sub((margin as u32).wrapping_mul(2));
