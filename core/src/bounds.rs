@@ -37,11 +37,4 @@ impl Bounds {
         let Self { low, high } = self;
         Self { low: low.less(by), high: high.plus(by) }
     }
-
-    /// Around a block's corners.
-    #[must_use]
-    #[inline(always)]
-    pub fn around(&[a, b, c, d]: &[PlayUv; 4]) -> Self {
-        Self::of(a, b).join(Self::of(c, d))
-    }
 }

@@ -77,21 +77,24 @@ impl Chart {
         inside && (!self.masked() || texture.mask.covers(uv))
     }
 
-    /// How much the chart covers of what lies within `bounds`, with some room for rounding.
+    /// Whether nothing of the chart lies within `bounds`, with some room for rounding.
     #[must_use]
     #[inline(always)]
-    pub fn cover(&self, bounds: &Bounds, texture: &Texture<'_>) -> Cover {
-        let &Bounds { low, high } = bounds;
+    pub const fn misses(&self, &Bounds { low, high }: &Bounds) -> bool {
         let (left, right) = (self.left.wrapping_sub(SLACK), self.right.wrapping_add(SLACK));
         let (top, bottom) = (self.top.wrapping_sub(SLACK), self.bottom.wrapping_add(SLACK));
-        if high.u < left || low.u >= right || high.v < top || low.v >= bottom {
-            return Cover::Nothing;
-        }
-        const TWICE: i32 = 2 * SLACK;
-        let (left, right) = (left.wrapping_add(TWICE), right.wrapping_sub(TWICE));
-        let (top, bottom) = (top.wrapping_add(TWICE), bottom.wrapping_sub(TWICE));
-        let all = low.u >= left && high.u < right && low.v >= top && high.v < bottom;
-        if all && (!self.masked() || texture.mask.fills(&bounds.wider(PlayUv { u: SLACK, v: SLACK }))) { Cover::All } else { Cover::Part }
+        high.v < top || low.v >= bottom || high.u < left || low.u >= right
+    }
+
+    /// Whether the chart covers all that lies within `bounds`, with some room for rounding.
+    #[must_use]
+    #[inline(always)]
+    pub fn fills(&self, bounds: &Bounds, texture: &Texture<'_>) -> bool {
+        let &Bounds { low, high } = bounds;
+        let (left, right) = (self.left.wrapping_add(SLACK), self.right.wrapping_sub(SLACK));
+        let (top, bottom) = (self.top.wrapping_add(SLACK), self.bottom.wrapping_sub(SLACK));
+        let inside = low.u >= left && high.u < right && low.v >= top && high.v < bottom;
+        inside && (!self.masked() || texture.mask.fills(&bounds.wider(PlayUv { u: SLACK, v: SLACK })))
     }
 
     /// Passes those of the rectangle's edges on that what lies within `bounds` may cross, each with what is said of its coordinate: u or v.

@@ -277,7 +277,7 @@ fn block<P: Paint>(site: &Site<'_, '_, '_>, mixed: Mixed, y: u32, pixels: &mut [
         if shown == 0 {
             continue;
         }
-        let forms = site.forms(&site.cell(sheet), offset).map(beside);
+        let forms = site.forms(sheet, offset).map(beside);
         if tested && sheet.test() != FIELD {
             shown = span::inside(&chart, shown, wide, &forms, &texture);
         }

@@ -10,7 +10,7 @@ use crate::row::{Layer, Place};
 use crate::sheet::{Sheet, Stretch};
 use crate::site::Site;
 use crate::torn::{self, Mixed, Shown, Side};
-use crate::window::{Middle, Room, Tile};
+use crate::window::{Middle, Room, Tile, Window};
 use core::slice;
 
 /// A strip's blocks, in caller's memory.
@@ -63,7 +63,8 @@ impl Plan<'_> {
         // The last strip may have been planned for pixels that are told from fewer texels.
         self.near = room.map_or(0, |room| room.known(self.near));
         let blocks = 1u32.wrapping_shl(site.log2().wrapping_sub(log2));
-        let mut across = Across { site, room, strip, log2, blocks, width: site.bundle.size().0, left: 0, block: 0 };
+        let [_, down] = site.offset(0, strip);
+        let mut across = Across { site, room, down, log2, blocks, width: site.bundle.size().0, left: 0, block: 0 };
         for &stretch in site.sheets.stretches() {
             match site.sheets.of(stretch) {
                 [sheet] => self.smooth(&mut across, stretch, sheet),
@@ -136,56 +137,65 @@ impl Plan<'_> {
     fn extend(&mut self, across: &Across<'_, '_, '_>, sheet: &Sheet, along: u16, most: usize) -> u16 {
         let Some(room) = &across.room else { return 0 };
         let ([top, bottom], [above, below]) = (across.site.rows, sheet.further(along).nodes().map(usize::from));
-        let cells = Cells { room, label: sheet.label(), low: across.offset()[1] > 0, most, near: self.near };
+        let cells = Cells { room, label: sheet.label(), low: across.down > 0, most, near: self.near };
         let bends = [top.node.get(above..).unwrap_or(&[]), bottom.node.get(below..).unwrap_or(&[])];
         let flat = [top.layer.get(above..).unwrap_or(&[]), bottom.layer.get(below..).unwrap_or(&[])];
         match (across.site.log2(), across.site.straight()) {
-            (3, false) => self.grow::<1, _>(&cells, bends),
-            (3, true) => self.grow::<1, _>(&cells, flat),
-            (4, false) => self.grow::<2, _>(&cells, bends),
-            (4, true) => self.grow::<2, _>(&cells, flat),
+            // What most bundles are made of has code of its own.
+            (3, false) if room.window == Window::USUAL => self.grow::<1, true, _>(&cells, bends),
+            (3, false) => self.grow::<1, false, _>(&cells, bends),
+            (3, true) => self.grow::<1, false, _>(&cells, flat),
+            (4, false) => self.grow::<2, false, _>(&cells, bends),
+            (4, true) => self.grow::<2, false, _>(&cells, flat),
             _ => 0,
         }
     }
 
     /// Appends tiles of `cells` of so many `TILES` a row of blocks, as long as each fits a window; returns of how many. The `lines` above and below start
     /// at their left corners.
-    // Windows have no code of their own: that would save a hundredth of a frame's instructions, for 4 KB.
+    // Windows other than the usual one have no code of their own: a kilobyte or more each.
     #[inline(never)]
-    fn grow<const TILES: usize, T: Place>(&mut self, cells: &Cells<'_>, lines: [&[T]; 2]) -> u16 {
+    fn grow<const TILES: usize, const USUAL: bool, T: Place>(&mut self, cells: &Cells<'_>, lines: [&[T]; 2]) -> u16 {
         let Some(slots) = self.tile.get_mut(self.tiles..).map(|slots| slots.as_chunks_mut::<TILES>().0) else { return 0 };
         let Some(slots) = slots.get_mut(..cells.most) else { return 0 };
         // An axis after the other: what is known of both at a time would not fit a small processor's registers.
-        let done = lay_down::<TILES, T>(slots, lines, cells);
-        let done = lay_across::<TILES, T>(slots.get_mut(..done).unwrap_or(&mut []), lines, cells);
+        let done = lay_down::<TILES, USUAL, T>(slots, lines, cells);
+        let done = lay_across::<TILES, USUAL, T>(slots.get_mut(..done).unwrap_or(&mut []), lines, cells);
         self.near = slots.get(done.wrapping_sub(1)).and_then(|tiles| tiles.last()).map_or(self.near, |last| last.row);
         self.tiles = self.tiles.wrapping_add(done.wrapping_mul(TILES));
         done as u16
     }
 
-    /// Plans the block at `across`, of a cell of `sheets`: by sides, of which the one that most pixels show becomes its tile; where it has none, pixel by
-    /// pixel, as `mixed` says.
+    /// Plans the block at `across`, of a cell of `sheets`: by sides, or else by a tile alone, or pixel by pixel, as `mixed` says.
+    #[inline(always)]
     fn block(&mut self, across: &Across<'_, '_, '_>, sheets: &[Sheet], mixed: Mixed) {
-        let (site, offset) = (across.site, across.offset());
-        let tests = |sheets: u32| {
-            let pixels = across.width.saturating_sub(across.left).min(1 << across.log2);
-            pixels.wrapping_mul(sheets.saturating_sub(1))
-        };
-        let free = self.side.get_mut(self.sides..).unwrap_or(&mut []);
-        let room = across.room.as_ref().filter(|_| !self.sideless);
-        if let Some(share) = room.and_then(|room| torn::share(site, across.block, offset, sheets, (room, self.near), free)) {
-            self.tests = self.tests.wrapping_add(tests(share.sheets));
-            let first = self.sides;
-            self.sides = first.wrapping_add(share.sides);
-            self.base(site, share.most.map(|most| first.wrapping_add(most)));
-            return;
+        if !self.share(across, sheets) {
+            self.other(across, sheets, mixed);
         }
-        let shown = torn::candidates(site, offset, sheets);
+    }
+
+    /// Plans the block by sides, of which the one that most pixels show becomes its tile; false where it has none.
+    #[inline(never)]
+    fn share(&mut self, across: &Across<'_, '_, '_>, sheets: &[Sheet]) -> bool {
+        let Some(room) = across.room.as_ref().filter(|_| !self.sideless) else { return false };
+        let (site, first) = (across.site, self.sides);
+        let free = self.side.get_mut(first..).unwrap_or(&mut []);
+        let Some(share) = torn::share(site, across.block, across.offset(), sheets, (room, self.near), free) else { return false };
+        self.tests = self.tests.wrapping_add(across.tests(share.sheets));
+        self.sides = first.wrapping_add(share.sides);
+        self.base(site, share.most.map(|most| first.wrapping_add(most)));
+        true
+    }
+
+    /// Plans the block without sides.
+    #[inline(never)]
+    fn other(&mut self, across: &Across<'_, '_, '_>, sheets: &[Sheet], mixed: Mixed) {
+        let shown = torn::candidates(across.site, across.offset(), sheets);
         let single = sheets.get(shown.trailing_zeros() as usize).filter(|_| shown.is_power_of_two());
         if single.is_some_and(|sheet| self.append(across, sheet)) {
             return;
         }
-        self.tests = self.tests.wrapping_add(tests(shown.count_ones()));
+        self.tests = self.tests.wrapping_add(across.tests(shown.count_ones()));
         self.put(Tile::NONE);
         if let Some(slot) = self.mixed.get_mut(self.mixes) {
             *slot = Mixed { block: across.block as u16, sheets: shown, ..mixed };
@@ -196,14 +206,23 @@ impl Plan<'_> {
     /// Makes side `side` the tile of its block, drawn all over it before the other sides are drawn over that; none: it has only sides.
     #[inline(always)]
     fn base(&mut self, site: &Site<'_, '_, '_>, side: Option<usize>) {
-        let Some(most) = side.and_then(|side| self.side.get_mut(side)) else { return self.put(Tile::NONE) };
-        let tile = most.tile;
+        let Some((most, slot)) = side.and_then(|side| self.side.get_mut(side)).zip(self.tile.get_mut(self.tiles)) else {
+            return self.put(Tile::NONE);
+        };
         most.shown = Shown::NONE;
         // Seldom it is none of the last ones: to move others would take longer than to pass it by.
         if side == Some(self.sides.wrapping_sub(1)) {
             self.sides = self.sides.wrapping_sub(1);
         }
-        if site.plain(tile.label) { self.plain(1) } else { self.put(tile) }
+        let Tile { row, label, .. } = most.tile;
+        if site.plain(label) {
+            self.plain(1);
+        } else {
+            // Number by number: it would be moved by a call.
+            *slot = most.tile.of(label, row);
+            self.near = row;
+            self.tiles = self.tiles.wrapping_add(1);
+        }
     }
 
     /// Appends the block at `across`, which shows one sheet; false where its positions fit no window.
@@ -214,9 +233,13 @@ impl Plan<'_> {
             return true;
         }
         let Some(room) = &across.room else { return false };
-        let patch = across.site.block(&across.site.cell(sheet), across.offset());
+        let patch = across.site.block(sheet, across.offset());
         let Some(row) = room.row(&patch.bounds(), self.near) else { return false };
-        self.put(room.window.tile(&patch, sheet.label(), row, across.log2));
+        if let Some(slot) = self.tile.get_mut(self.tiles) {
+            room.window.put(slot, &patch, sheet.label(), row, across.log2);
+            self.near = row;
+            self.tiles = self.tiles.wrapping_add(1);
+        }
         true
     }
 
@@ -225,15 +248,12 @@ impl Plan<'_> {
         (0..blocks).for_each(|_| self.put(Tile::PLAIN));
     }
 
-    /// Appends a tile.
+    /// Appends a tile that is in no window.
     #[inline(always)]
     fn put(&mut self, tile: Tile) {
         if let Some(slot) = self.tile.get_mut(self.tiles) {
             *slot = tile;
             self.tiles = self.tiles.wrapping_add(1);
-            if tile.in_window() {
-                self.near = tile.row;
-            }
         }
     }
 }
@@ -254,6 +274,12 @@ impl Cells<'_> {
     /// How far nodes keep from the edges of a window, Q16 texels.
     const fn margin(&self) -> i32 {
         self.room.margin.wrapping_add(BULGE)
+    }
+
+    /// The kind of window, which may be known to be the `USUAL` one.
+    #[inline(always)]
+    const fn window_of<const USUAL: bool>(&self) -> Window {
+        if USUAL { Window::USUAL } else { self.room.window }
     }
 
     /// The first row of a window for the cell whose v are these at its corners, one that has room where they are heading; `None` where none holds it.
@@ -292,8 +318,12 @@ fn sums<T: Place>(above: &T, below: &T, one: impl Fn(Layer) -> i32) -> [i32; 2] 
 
 /// Fills `slots` with v of the tiles of `cells` between nodes above and below, and their windows, as long as there are such; returns of how many cells.
 #[inline(always)]
-fn lay_down<const TILES: usize, T: Place>(slots: &mut [[Tile; TILES]], [above, below]: [&[T]; 2], cells: &Cells<'_>) -> usize {
-    let window = cells.room.window;
+fn lay_down<const TILES: usize, const USUAL: bool, T: Place>(
+    slots: &mut [[Tile; TILES]],
+    [above, below]: [&[T]; 2],
+    cells: &Cells<'_>,
+) -> usize {
+    let window = cells.window_of::<USUAL>();
     let v = |layer: Layer| layer.uv().v;
     let margin = cells.margin();
     // From the margin on: inside is what is not negative and below the room, one comparison for both.
@@ -329,8 +359,12 @@ fn lay_down<const TILES: usize, T: Place>(slots: &mut [[Tile; TILES]], [above, b
 
 /// Adds u to the tiles in `slots`, likewise.
 #[inline(always)]
-fn lay_across<const TILES: usize, T: Place>(slots: &mut [[Tile; TILES]], [above, below]: [&[T]; 2], cells: &Cells<'_>) -> usize {
-    let window = cells.room.window;
+fn lay_across<const TILES: usize, const USUAL: bool, T: Place>(
+    slots: &mut [[Tile; TILES]],
+    [above, below]: [&[T]; 2],
+    cells: &Cells<'_>,
+) -> usize {
+    let window = cells.window_of::<USUAL>();
     let margin = cells.margin();
     // From the margin on: inside is what is not negative and below the room, one comparison for both.
     let room = 1u32.wrapping_shl(window.width_log2.wrapping_add(16)).wrapping_sub((margin as u32).wrapping_mul(2));
@@ -364,7 +398,8 @@ fn lay_across<const TILES: usize, T: Place>(slots: &mut [[Tile; TILES]], [above,
 struct Across<'s, 'a, 'm> {
     site: &'s Site<'s, 'a, 'm>,
     room: Option<Room>,
-    strip: u32,
+    /// How far the strip is from its cells' upper edge, pixels.
+    down: u32,
     /// A block is 2^this pixels wide.
     log2: u32,
     /// Blocks of a cell, from left to right.
@@ -379,7 +414,14 @@ struct Across<'s, 'a, 'm> {
 impl Across<'_, '_, '_> {
     /// How far the next block is from its cell's left upper corner, pixels.
     fn offset(&self) -> [u32; 2] {
-        self.site.offset(self.block, self.strip)
+        // As many blocks as a cell has are a power of two.
+        [(self.block & self.blocks.wrapping_sub(1)).wrapping_shl(self.log2), self.down]
+    }
+
+    /// Coverage tests of a row of the next block, where so many of its sheets are looked at: the last is not tested.
+    fn tests(&self, sheets: u32) -> u32 {
+        let pixels = self.width.saturating_sub(self.left).min(1 << self.log2);
+        pixels.wrapping_mul(sheets.saturating_sub(1))
     }
 
     /// On by so many blocks.

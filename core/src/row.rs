@@ -5,7 +5,7 @@ use crate::fixed::{KEY_MIN, KeyUv, ONE, PLAY_BITS, PlayUv, WEIGHT_BITS, field_di
 use crate::format::LabelRecord;
 use crate::grid::Grid;
 use crate::key::{self, BACKDROP, Chain, Key, NONE};
-use crate::timeline::{Moment, Weights};
+use crate::timeline::{Moment, WeightSet, Weights};
 
 /// A layer at one moment: a [`PlayUv`] in caller's memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -56,6 +56,9 @@ pub trait Place: Copy {
 
     /// A layer that bends nowhere.
     fn flat(layer: Layer) -> Self;
+
+    /// Puts it there; how it bends is still to be told.
+    fn put(&mut self, layer: Layer);
 }
 
 impl Place for Layer {
@@ -73,6 +76,11 @@ impl Place for Layer {
     fn flat(layer: Layer) -> Self {
         layer
     }
+
+    #[inline(always)]
+    fn put(&mut self, layer: Layer) {
+        *self = layer;
+    }
 }
 
 impl Place for Node {
@@ -89,6 +97,11 @@ impl Place for Node {
     #[inline(always)]
     fn flat(layer: Layer) -> Self {
         Self { layer, across: Layer::ZERO, down: Layer::ZERO }
+    }
+
+    #[inline(always)]
+    fn put(&mut self, layer: Layer) {
+        self.layer = layer;
     }
 }
 
@@ -137,28 +150,20 @@ fn straight<'s>(slots: impl Iterator<Item = &'s mut i16>, from: &[i8], to: &[i8]
     }
 }
 
-/// Fills `slots` with what `four` keys' positions make with these `weights`.
-#[inline(never)]
-fn blend_all<T: Place>(slots: &mut [T], [a, b, c, d]: [&[u32]; 4], weights: Weights, key_bits: u32) {
-    let keys = a.iter().zip(b).zip(c.iter().zip(d));
-    for (slot, ((&a, &b), (&c, &d))) in slots.iter_mut().zip(keys) {
-        *slot = T::flat(blend([KeyUv(a), KeyUv(b), KeyUv(c), KeyUv(d)], weights, key_bits));
-    }
-}
-
 /// The sum of `four` positions times `weights`, in Q15.16, rounded to nearest, ties up; exact where one weight is one. Coordinates of
 /// `key_bits` fraction bits start at [`KEY_MIN`], and as the weights sum to one, so does the sum.
 #[inline(always)]
-const fn blend(four: [KeyUv; 4], [a, b, c, d]: Weights, key_bits: u32) -> Layer {
+const fn blend([e, f, g, h]: [KeyUv; 4], [a, b, c, d]: Weights, key_bits: u32) -> Layer {
     let drop = key_bits.wrapping_add(WEIGHT_BITS).wrapping_sub(PLAY_BITS);
     let start = (KEY_MIN << WEIGHT_BITS).wrapping_add(1i32.wrapping_shl(drop) >> 1);
-    let [e, f, g, h] = four;
     // Magnitudes of weights sum to at most 1.6, stored coordinates are below 2^16: the sums fit.
-    let u = start.wrapping_add(a.wrapping_mul((e.0 & 0xffff) as i32)).wrapping_add(b.wrapping_mul((f.0 & 0xffff) as i32));
-    let u = u.wrapping_add(c.wrapping_mul((g.0 & 0xffff) as i32)).wrapping_add(d.wrapping_mul((h.0 & 0xffff) as i32));
-    let v = start.wrapping_add(a.wrapping_mul((e.0 >> 16) as i32)).wrapping_add(b.wrapping_mul((f.0 >> 16) as i32));
+    let v = a.wrapping_mul((e.0 >> 16) as i32).wrapping_add(b.wrapping_mul((f.0 >> 16) as i32));
     let v = v.wrapping_add(c.wrapping_mul((g.0 >> 16) as i32)).wrapping_add(d.wrapping_mul((h.0 >> 16) as i32));
-    Layer { u: u.wrapping_shr(drop), v: v.wrapping_shr(drop) }
+    // Both as they are stored in a word: what v adds to that is known.
+    let both = a.wrapping_mul(e.0 as i32).wrapping_add(b.wrapping_mul(f.0 as i32));
+    let both = both.wrapping_add(c.wrapping_mul(g.0 as i32)).wrapping_add(d.wrapping_mul(h.0 as i32));
+    let u = both.wrapping_sub(v.wrapping_shl(16));
+    Layer { u: start.wrapping_add(u).wrapping_shr(drop), v: start.wrapping_add(v).wrapping_shr(drop) }
 }
 
 /// A row's chains, gone through by label and from left to right, beside those of another.
@@ -198,74 +203,94 @@ impl<'k> Beside<'k> {
     }
 }
 
-/// A chain of a row at one moment, and the chains it comes from at both ends of the interval.
-struct Between<'k> {
-    chain: Chain,
-    start: &'k Chain,
-    end: &'k Chain,
-    grid: Grid,
-    row: usize,
+/// Fills `slots` with the layers of the backdrop, which stands still, from node `column` of row `row` on.
+#[inline(never)]
+fn stand<T: Place>(slots: &mut [T], record: &LabelRecord, [column, row]: [u16; 2], log2: u32, key_bits: u32) {
+    let layer = |column: u16| {
+        let PlayUv { u, v } = key::backdrop(record, [column, row], log2, key_bits);
+        T::flat(Layer { u, v })
+    };
+    if record.plain() {
+        slots.fill(layer(0));
+        return;
+    }
+    for (slot, column) in slots.iter_mut().zip(column..) {
+        *slot = layer(column);
+    }
 }
 
-impl Between<'_> {
-    /// Fills in the chain's layers.
-    #[inline(always)]
-    fn fill<'k, T: Place>(&self, layers: &mut [T], keys: &Around<'k, '_>, moment: &Moment, beside: [&mut Beside<'k>; 2]) {
-        let slots = layers.get_mut(usize::from(self.chain.at)..).unwrap_or(&mut []);
-        let slots = slots.get_mut(..usize::from(self.chain.nodes())).unwrap_or(&mut []);
-        match keys.backdrop {
-            Some(record) if self.chain.label == BACKDROP => self.stand(slots, record, keys.key_bits),
-            _ => self.weigh(slots, keys, moment, beside),
-        }
+/// An outer key's row, gone through beside the interval's: its chains, and the positions they are about.
+#[derive(Clone, Copy)]
+struct Outer<'k> {
+    beside: Beside<'k>,
+    uv: &'k [u32],
+}
+
+impl<'k> Outer<'k> {
+    fn of(key: Option<&'k Key<'_>>, row: usize) -> Self {
+        Self { beside: Beside::of(key, row), uv: key.map_or(&[], |key| key.uv) }
     }
 
-    /// Those of the backdrop, which stands still.
-    #[inline(never)]
-    fn stand<T: Place>(&self, slots: &mut [T], record: &LabelRecord, key_bits: u32) {
-        let layer = |column: u16| {
-            let PlayUv { u, v } = key::backdrop(record, [column, self.row as u16], self.grid.log2, key_bits);
-            T::flat(Layer { u, v })
-        };
-        if record.plain() {
-            slots.fill(layer(0));
-            return;
+    /// The positions of `label` from node `column` on, and the node where that ends: that they are, or that there are none.
+    #[inline(always)]
+    fn part(&mut self, label: u16, column: u16) -> (Option<&'k [u32]>, u16) {
+        let (at, end) = self.beside.part(label, column);
+        (at.and_then(|at| self.uv.get(at..)), end)
+    }
+}
+
+/// Fills `slots` with the layers of `chain`, which stand from `ends` on in both ends of the interval; outer keys that lack one weigh nothing.
+#[inline(never)]
+fn weigh<'k, T: Place>(
+    mut slots: &mut [T],
+    chain: &Chain,
+    ends: [usize; 2],
+    keys: &Around<'k, '_>,
+    weights: &WeightSet,
+    [before, after]: &mut [Outer<'k>; 2],
+) {
+    let layers = |key: &'k Key<'_>, at: usize| key.uv.get(at..).unwrap_or(&[]);
+    let ([from, to], mut column) = (ends, chain.first);
+    let (mut from, mut to) = (layers(keys.from, from), layers(keys.to, to));
+    while !slots.is_empty() {
+        let (first, high) = before.part(chain.label, column);
+        let (last, low) = after.part(chain.label, column);
+        let stop = chain.end.min(high).min(low);
+        let (some, others) = slots.split_at_mut(usize::from(stop.wrapping_sub(column)).min(slots.len()));
+        let missing = usize::from(first.is_none()) | usize::from(last.is_none()) << 1;
+        let Some(weights) = weights.get(missing) else { break };
+        let (first, last, nodes) = (first.unwrap_or(from), last.unwrap_or(to), some.len());
+        for (slot, ((&a, &b), (&c, &d))) in some.iter_mut().zip(first.iter().zip(from).zip(to.iter().zip(last))) {
+            slot.put(blend([KeyUv(a), KeyUv(b), KeyUv(c), KeyUv(d)], *weights, keys.key_bits));
         }
-        for (slot, column) in slots.iter_mut().zip(self.chain.first..) {
-            *slot = layer(column);
+        (slots, column) = (others, stop);
+        (from, to) = (from.get(nodes..).unwrap_or(&[]), to.get(nodes..).unwrap_or(&[]));
+        // A chain of no nodes, which only a broken bundle has, ends the row.
+        if nodes == 0 {
+            break;
         }
     }
+}
 
-    /// Those of others, which are in both ends of the interval; outer keys that lack one weigh nothing.
-    #[inline(always)]
-    fn weigh<'k, T: Place>(&self, mut slots: &mut [T], keys: &Around<'k, '_>, moment: &Moment, [before, after]: [&mut Beside<'k>; 2]) {
-        let Self { chain, start, end, .. } = self;
-        let [both, no_first, no_last, neither] = &moment.weights;
-        let layers = |key: &'k Key<'_>, at: usize| key.uv.get(at..).unwrap_or(&[]);
-        let mut from = layers(keys.from, start.along(chain.first));
-        let mut to = layers(keys.to, end.along(chain.first));
-        let mut column = chain.first;
-        while !slots.is_empty() {
-            let (first, high) = before.part(chain.label, column);
-            let (last, low) = after.part(chain.label, column);
-            let stop = chain.end.min(high).min(low);
-            let (some, others) = slots.split_at_mut(usize::from(stop.wrapping_sub(column)).min(slots.len()));
-            let weights = match (first, last) {
-                (Some(_), Some(_)) => both,
-                (None, Some(_)) => no_first,
-                (Some(_), None) => no_last,
-                (None, None) => neither,
-            };
-            let outer = |key: Option<&'k Key<'_>>, at: Option<usize>| Some(layers(key?, at?));
-            let four = [outer(keys.before, first).unwrap_or(from), from, to, outer(keys.after, last).unwrap_or(to)];
-            let nodes = some.len();
-            blend_all(some, four, *weights, keys.key_bits);
-            (slots, column) = (others, stop);
-            (from, to) = (from.get(nodes..).unwrap_or(&[]), to.get(nodes..).unwrap_or(&[]));
-            // A chain of no nodes, which only a broken bundle has, ends the row.
-            if nodes == 0 {
-                break;
-            }
+/// Works out how the nodes `here` bend down, between those above and below them. Those above that had none above themselves bend as these do.
+#[inline(always)]
+fn bend_between(here: &mut [Node], upper: &mut [Node], lower: &[Node]) {
+    for ((here, upper), lower) in here.iter_mut().zip(upper).zip(lower) {
+        here.down = Layer::bend(upper.layer, here.layer, lower.layer);
+        if upper.down.u == UNTOLD.u {
+            upper.down = here.down;
         }
+    }
+}
+
+/// Likewise where there are none below: they bend as those above do.
+#[inline(always)]
+fn bend_on(here: &mut [Node], upper: &mut [Node]) {
+    for (here, upper) in here.iter_mut().zip(upper) {
+        if upper.down.u == UNTOLD.u {
+            upper.down = Layer::ZERO;
+        }
+        here.down = upper.down;
     }
 }
 
@@ -291,6 +316,7 @@ pub struct NodeRow<'m> {
 impl NodeRow<'_> {
     fn clear(&mut self) {
         self.head.fill(NONE);
+        self.field.fill([0; 2]);
         self.chains = 0;
     }
 
@@ -315,19 +341,30 @@ impl NodeRow<'_> {
     pub fn fill(&mut self, grid: Grid, row: Option<usize>, keys: &Around<'_, '_>, moment: &Moment) -> u32 {
         self.clear();
         let Some(row) = row.filter(|&row| row < grid.node_rows()) else { return 0 };
-        let [mut before, from, mut to, mut after] =
-            [keys.before, Some(keys.from), Some(keys.to), keys.after].map(|key| Beside::of(key, row));
+        let [from, mut to] = [keys.from, keys.to].map(|key| Beside::of(Some(key), row));
+        // At a key no other one weighs anything.
+        let mut outer = [keys.before, keys.after].map(|key| Outer::of(key.filter(|_| moment.passed > 0), row));
         let mut count = 0usize;
         for start in from.chains {
             let mut column = start.first;
             while let Some(end) = to.from(start.label, column).filter(|end| end.first < start.end) {
                 let (first, stop) = (column.max(end.first), start.end.min(end.end));
                 let Some(chain) = self.open(start.label, first, stop, count) else { return count as u32 };
-                let place = Between { chain, start, end, grid, row };
-                if self.node.is_empty() {
-                    place.fill(self.layer, keys, moment, [&mut before, &mut after]);
-                } else {
-                    place.fill(self.node, keys, moment, [&mut before, &mut after]);
+                let range = count..count.wrapping_add(chain.nodes().into());
+                match keys.backdrop.filter(|_| chain.label == BACKDROP) {
+                    Some(record) => {
+                        let (at, bits) = ([first, row as u16], keys.key_bits);
+                        stand(self.layer.get_mut(range.clone()).unwrap_or_default(), record, at, grid.log2, bits);
+                        stand(self.node.get_mut(range).unwrap_or_default(), record, at, grid.log2, bits);
+                    }
+                    None => {
+                        let ends = [start.along(first), end.along(first)];
+                        if let Some(slots) = self.node.get_mut(range.clone()) {
+                            weigh(slots, &chain, ends, keys, &moment.weights, &mut outer);
+                        } else if let Some(slots) = self.layer.get_mut(range) {
+                            weigh(slots, &chain, ends, keys, &moment.weights, &mut outer);
+                        }
+                    }
                 }
                 self.distances(chain, [start, end], keys, moment.linear);
                 count = count.wrapping_add(chain.nodes().into());
@@ -344,13 +381,12 @@ impl NodeRow<'_> {
     /// Works out the fields of `chain`, which is in both `ends` of the interval: straight between them, Q8 pixels.
     #[inline(always)]
     fn distances(&mut self, chain: Chain, ends: [&Chain; 2], keys: &Around<'_, '_>, linear: i32) {
-        let slots = self.field.get_mut(usize::from(chain.at)..).unwrap_or(&mut []);
-        let slots = slots.get_mut(..chain.nodes().into()).unwrap_or(&mut []);
-        slots.fill([0; 2]);
         // Most chains are never tested, and have none.
         if ends.iter().all(|end| end.field == NONE) {
             return;
         }
+        let slots = self.field.get_mut(usize::from(chain.at)..).unwrap_or(&mut []);
+        let slots = slots.get_mut(..chain.nodes().into()).unwrap_or(&mut []);
         let [from, to] = [(keys.from, ends[0]), (keys.to, ends[1])].map(|(key, end)| {
             let first = usize::from(end.field).wrapping_add(chain.first.wrapping_sub(end.first).into());
             let [a, b] = &key.fields;
@@ -408,27 +444,13 @@ impl NodeRow<'_> {
                 let (high, top) = uppers.part(chain.label, column);
                 let (low, bottom) = lowers.part(chain.label, column);
                 let stop = chain.end.min(top).min(bottom);
-                let (at, nodes) = (chain.along(column), usize::from(stop.wrapping_sub(column)));
-                let here = self.node.get_mut(at..).and_then(|all| all.get_mut(..nodes)).unwrap_or(&mut []);
+                let part = |at: usize| at..at.wrapping_add(stop.wrapping_sub(column).into());
+                let here = self.node.get_mut(part(chain.along(column))).unwrap_or(&mut []);
                 // Where there is none above, the next row tells.
-                if let Some(upper) = high.and_then(|high| above.node.get_mut(high..)) {
-                    match low.and_then(|low| below.node.get(low..)) {
-                        Some(lower) => {
-                            for ((here, upper), lower) in here.iter_mut().zip(upper).zip(lower) {
-                                here.down = Layer::bend(upper.layer, here.layer, lower.layer);
-                                if upper.down == UNTOLD {
-                                    upper.down = here.down;
-                                }
-                            }
-                        }
-                        None => {
-                            for (here, upper) in here.iter_mut().zip(upper) {
-                                if upper.down == UNTOLD {
-                                    upper.down = Layer::ZERO;
-                                }
-                                here.down = upper.down;
-                            }
-                        }
+                if let Some(upper) = high.and_then(|high| above.node.get_mut(part(high))) {
+                    match low.and_then(|low| below.node.get(part(low))) {
+                        Some(lower) => bend_between(here, upper, lower),
+                        None => bend_on(here, upper),
                     }
                 }
                 // Only broken bundles have chains of no nodes.
@@ -463,20 +485,18 @@ impl NodeRow<'_> {
         self.field.get(usize::from(index)..).and_then(<[_]>::first_chunk).copied().unwrap_or([[1, 1]; 2])
     }
 
-    /// Layer `index` and the next one of its chain, and the sums of their second differences, across and down.
+    /// The numbers of layer `index` and of the next one of its chain, as [`Node`] has them, where space is cubic,
     #[must_use]
     #[inline(always)]
-    pub fn ends(&self, index: u16) -> [PlayUv; 4] {
-        let none = PlayUv::default();
-        let index = usize::from(index);
-        if let Some([left, right]) = self.node.get(index..).and_then(<[_]>::first_chunk) {
-            let sum = |a: Layer, b: Layer| a.uv().plus(b.uv());
-            return [left.layer.uv(), right.layer.uv(), sum(left.across, right.across), sum(left.down, right.down)];
-        }
-        match self.layer.get(index..).and_then(<[_]>::first_chunk) {
-            Some([left, right]) => [left.uv(), right.uv(), none, none],
-            None => [none; 4],
-        }
+    pub fn nodes(&self, index: u16) -> Option<&[i32; 12]> {
+        self.node.get(usize::from(index)..)?.first_chunk::<2>().map(bytemuck::cast_ref)
+    }
+
+    /// and as [`Layer`] has them, where it is linear.
+    #[must_use]
+    #[inline(always)]
+    pub fn layers(&self, index: u16) -> Option<&[i32; 4]> {
+        self.layer.get(usize::from(index)..)?.first_chunk::<2>().map(bytemuck::cast_ref)
     }
 }
 

@@ -97,37 +97,40 @@ impl RowSheets<'_> {
     #[inline(never)]
     pub fn fill(&mut self, grid: Grid, row: usize, lists: &Lists<'_>, rows: Rows<'_, '_>) {
         let mut cursor = lists.row(row);
-        let mut count = 0usize;
-        let mut column = 0usize;
-        self.stretches = 0;
+        let (mut count, mut column, mut stretches) = (0usize, 0usize, 0usize);
         // Nothing is known of any column.
         self.found.iter_mut().for_each(|found| found.end = 0);
         for stretch in self.stretch.iter_mut() {
             let Some(left) = grid.columns.checked_sub(column).filter(|&left| left > 0) else { break };
             let listed = lists.sheets(cursor);
-            let first = count;
-            let mut cells = 1usize;
-            cursor = cursor.next(lists);
-            for (index, &label) in listed.labels.iter().enumerate() {
-                // Columns ascend: what was found for one to the left holds up to where one of its chains ends.
+            let (first, mut tests, mut end) = (count, u32::from(listed.tests), 0);
+            for &label in listed.labels {
+                let test = tests as u8 & 3;
+                tests >>= 2;
                 let Some((known, slot)) = self.found.get_mut(usize::from(label)).zip(self.sheet.get_mut(count)) else { continue };
+                // Columns ascend: what was found for one to the left holds up to where one of its chains ends.
                 if column >= usize::from(known.end) {
                     let Some(found) = look_up(rows, label, column) else { continue };
                     *known = found;
                 }
-                let (along, most) = ((column as u16).wrapping_sub(known.column), known.end.wrapping_sub(column as u16));
-                *slot = Sheet { nodes: known.nodes, label, test: listed.test(index) as u8 }.further(along);
+                end = known.end;
+                *slot = Sheet { nodes: known.nodes, label, test }.further((column as u16).wrapping_sub(known.column));
                 count = count.wrapping_add(1);
-                if listed.labels.len() == 1 {
-                    let more = usize::from(most).min(left).saturating_sub(1);
-                    (cells, cursor) = lists.alike(cursor, label, more);
-                    cells = cells.wrapping_add(1);
-                }
+            }
+            cursor = cursor.next(lists);
+            let mut cells = 1usize;
+            if let &[label] = listed.labels
+                && count != first
+            {
+                let most = usize::from(end.wrapping_sub(column as u16));
+                (cells, cursor) = lists.alike(cursor, label, most.min(left).saturating_sub(1));
+                cells = cells.wrapping_add(1);
             }
             *stretch = Stretch { cells: cells as u16, sheet: first as u16, sheets: count.wrapping_sub(first) as u16 };
-            self.stretches = self.stretches.wrapping_add(1);
+            stretches = stretches.wrapping_add(1);
             column = column.wrapping_add(cells);
         }
+        self.stretches = stretches;
     }
 
     /// The stretches, from left to right.

@@ -84,25 +84,28 @@ impl Site<'_, '_, '_> {
     }
 
     /// What `sheet` has in its cell.
-    #[must_use]
-    // Of use in many places, and long: so are the next ones.
-    #[inline(never)]
-    pub fn cell(&self, sheet: &Sheet) -> Patch {
+    #[inline(always)]
+    fn cell(&self, sheet: &Sheet) -> Patch {
         Patch::new(self.rows, sheet)
     }
 
-    /// What of `cell`, a sheet's, is in the block that is so far from its left upper corner.
+    /// What `sheet` has in the block of its cell that is so far from its left upper corner.
     #[must_use]
-    #[inline(always)]
-    pub fn block(&self, cell: &Patch, offset: [u32; 2]) -> Patch {
-        cell.part(offset, self.block_log2(), self.log2())
+    // Of use in many places, and long: so are the next ones.
+    #[inline(never)]
+    pub fn block(&self, sheet: &Sheet, offset: [u32; 2]) -> Patch {
+        // Most often that is all of it.
+        if self.log2() <= BLOCK_LOG2 {
+            return self.cell(sheet);
+        }
+        self.cell(sheet).part(offset, BLOCK_LOG2, self.log2())
     }
 
-    /// Where `cell`, a sheet's, is from pixel to pixel of that block: u and v, as its coverage is told from them.
+    /// Where `sheet` is from pixel to pixel of that block: u and v, as its coverage is told from them.
     #[must_use]
     #[inline(never)]
-    pub fn forms(&self, cell: &Patch, offset: [u32; 2]) -> [Form; 2] {
-        cell.forms(self.log2()).map(|form| form.from(offset))
+    pub fn forms(&self, sheet: &Sheet, offset: [u32; 2]) -> [Form; 2] {
+        Patch::new_here(self.rows, sheet).forms(self.log2()).map(|form| form.from(offset))
     }
 
     /// Its field `which`, Q16 pixels: straight from edge to edge of the cell, whatever space is.

@@ -3,7 +3,7 @@
 
 use crate::atlas::Texture;
 use crate::bounds::Bounds;
-use crate::coverage::{Chart, Cover};
+use crate::coverage::Chart;
 use crate::fixed::PlayUv;
 use crate::form::Form;
 use crate::window::{Line, Tile, fraction};
@@ -212,10 +212,11 @@ pub fn covered(shown: u32, mut span: Span, texture: &Texture<'_>) -> u32 {
 pub fn inside(chart: &Chart, mut shown: u32, pixels: u32, forms: &[Form; 2], texture: &Texture<'_>) -> u32 {
     let span = Span::new(forms);
     let bounds = span.bounds(pixels);
-    match chart.cover(&bounds, texture) {
-        Cover::Nothing => return 0,
-        Cover::All => return shown,
-        Cover::Part => {}
+    if chart.misses(&bounds) {
+        return 0;
+    }
+    if chart.fills(&bounds, texture) {
+        return shown;
     }
     let [u, v] = forms;
     chart.crossed([u, v], &bounds, |form, edge| {
@@ -232,7 +233,7 @@ mod tests {
     use crate::coverage::Chart;
     use crate::fixed::PlayUv;
     use crate::format::LabelRecord;
-    use crate::patch::Patch;
+    use crate::patch::{Axis, Patch};
 
     #[test]
     fn pixels_inside_a_chart_are_those_whose_positions_are() {
@@ -247,7 +248,9 @@ mod tests {
         for round in 0..20_000u32 {
             let reach = if round % 2 == 0 { 1 << 17 } else { 1 << 20 };
             let mut around = |u: i32, v: i32| PlayUv { u: (u << 16) + next(reach) - next(reach), v: (v << 16) + next(reach) - next(reach) };
-            let patch = Patch { corners: [(); 4].map(|()| around(20, 31)), across: around(0, 0), down: around(0, 0) };
+            let ([a, b, c, d], across, down) = ([(); 4].map(|()| around(20, 31)), around(0, 0), around(0, 0));
+            let u = Axis::new([a.u, b.u, c.u, d.u], [across.u, down.u]);
+            let patch = Patch { u, v: Axis::new([a.v, b.v, c.v, d.v], [across.v, down.v]) };
             for log2 in [2, 3] {
                 let pixels = 1u32 << log2;
                 let mut forms = patch.forms(log2);

@@ -7,6 +7,7 @@ use crate::coverage::Cover;
 use crate::form::Form;
 use crate::format::MAX_SHEETS;
 use crate::lists::{CHART, FIELD};
+use crate::patch::{Axis, Patch};
 use crate::sheet::Sheet;
 use crate::site::Site;
 use crate::span::{self, Span};
@@ -72,11 +73,23 @@ impl Shown {
         (if row < 4 { upper } else { lower }).wrapping_shr(row.wrapping_mul(8)) & 0xff
     }
 
+    /// Those of these bits, the first row's lowest: in two of a processor's registers.
+    #[inline(always)]
+    const fn from_bits(bits: u64) -> Self {
+        Self([bits as u32, (bits >> 32) as u32])
+    }
+
     /// How many they are.
     #[inline(always)]
     const fn count(self) -> u32 {
+        // Of each pair, then of each four, of which two sums fit into four bits.
+        const fn fours(bits: u32) -> u32 {
+            let pairs = bits.wrapping_sub(bits >> 1 & 0x5555_5555);
+            (pairs & 0x3333_3333).wrapping_add(pairs >> 2 & 0x3333_3333)
+        }
         let [upper, lower] = self.0;
-        upper.count_ones().wrapping_add(lower.count_ones())
+        let sums = fours(upper).wrapping_add(fours(lower));
+        (sums & 0x0f0f_0f0f).wrapping_add(sums >> 4 & 0x0f0f_0f0f).wrapping_mul(0x0101_0101) >> 24
     }
 
     /// All pixels of row `row`.
@@ -147,7 +160,8 @@ pub struct Share {
 
 /// Works out the sides of block `block`, which is so far from the left upper corner of its torn cell of `sheets`, for positions that `room` has, best in the window
 /// from row `near` on, into `slots`. `None` where positions fit no window, there is no room, or no sheet. The frontmost sheet that covers a pixel shows.
-#[inline(never)]
+// Called from one place.
+#[inline(always)]
 pub fn share(
     site: &Site<'_, '_, '_>,
     block: u32,
@@ -158,33 +172,33 @@ pub fn share(
 ) -> Option<Share> {
     let log2 = site.block_log2();
     let mut share = Share { sides: 0, sheets: 0, most: None };
-    let (mut left, mut pixels) = (Shown::all(log2), 0);
-    let last = sheets.len().min(MAX_SHEETS).checked_sub(1)?;
-    for (place, sheet) in sheets.iter().enumerate().take(MAX_SHEETS) {
-        let chart = site.chart(sheet);
+    let (mut left, mut pixels, mut sheets) = (Shown::all(log2), 0, sheets);
+    sheets.first()?;
+    while let Some((sheet, behind)) = sheets.split_first() {
+        sheets = behind;
         // The last one covers what is left.
-        let tested = place < last;
+        let tested = !behind.is_empty();
         let mut shown = left;
-        let mut fields = if tested && sheet.test() != CHART { chart.fields() } else { 0..0 };
-        if !fields.all(|which| above(site, sheet, which, offset, &mut shown)) {
-            continue;
+        if tested && sheet.test() != CHART {
+            shown = shown.and(Shown::from_bits(above(site, sheet, offset)));
+            if shown == Shown::NONE {
+                share.sheets = share.sheets.wrapping_add(1);
+                continue;
+            }
         }
-        let patch = site.block(&site.cell(sheet), offset);
+        let chart = if tested && sheet.test() != FIELD { site.charts.get(usize::from(sheet.label())) } else { None };
+        let patch = site.block(sheet, offset);
         let bounds = patch.bounds();
-        if tested && sheet.test() != FIELD {
-            match chart.cover(&bounds, &site.texture) {
-                Cover::Nothing => continue,
-                Cover::Part if shown != Shown::NONE => {
-                    chart.crossed([false, true], &bounds, |down, edge| {
-                        let form = patch.form(down, log2);
-                        let near = negative(&Form { at: form.at.wrapping_sub(edge.at), ..form }, edge.reach(), log2);
-                        shown = if edge.upper { shown.and(near) } else { shown.and_not(near) };
-                    });
-                    if chart.masked() && shown != Shown::NONE {
-                        shown = masked(shown, patch.forms(log2), log2, &site.texture);
-                    }
-                }
-                _ => {}
+        if let Some(chart) = chart {
+            if chart.misses(&bounds) {
+                continue;
+            }
+            chart.crossed([&patch.u, &patch.v], &bounds, |axis, edge| {
+                let near = Shown::from_bits(negative(axis, edge.at, edge.reach(), log2));
+                shown = if edge.upper { shown.and(near) } else { shown.and_not(near) };
+            });
+            if chart.masked() && shown != Shown::NONE && !chart.fills(&bounds, &site.texture) {
+                shown = Shown::from_bits(masked(shown, &patch, log2, &site.texture));
             }
         }
         share.sheets = share.sheets.wrapping_add(1);
@@ -193,7 +207,9 @@ pub fn share(
         }
         left = left.and_not(shown);
         let mut add = |shown: Shown, row: u16| {
-            *slots.get_mut(share.sides)? = Side { tile: room.window.tile(&patch, sheet.label(), row, log2), shown, block };
+            let slot = slots.get_mut(share.sides)?;
+            room.window.put(&mut slot.tile, &patch, sheet.label(), row, log2);
+            (slot.shown, slot.block) = (shown, block);
             share.sides = share.sides.wrapping_add(1);
             Some(())
         };
@@ -214,39 +230,50 @@ pub fn share(
     Some(share)
 }
 
-/// Leaves those pixels of a block in `shown` where field `which` of `sheet` is above zero; false where it is nowhere.
-#[inline(always)]
-fn above(site: &Site<'_, '_, '_>, sheet: &Sheet, which: usize, offset: [u32; 2], shown: &mut Shown) -> bool {
-    let corners = site.field_corners(sheet, which, offset);
-    let cover = field_cover(corners);
-    if cover == Cover::Part {
-        // What is below zero where the field is above. It bends nowhere: farthest from zero it is in a corner.
-        let (below, log2) = (corners.map(i32::wrapping_neg), site.block_log2());
-        let reach = below.iter().fold(0, |reach, corner| corner.unsigned_abs().max(reach));
-        *shown = shown.and(negative(&Form::new(below, [0; 2], log2), reach, log2));
+/// At which pixels of a block all fields of `sheet` are above zero.
+// A function of its own: most sheets are tested by their charts, which has all registers then.
+#[inline(never)]
+fn above(site: &Site<'_, '_, '_>, sheet: &Sheet, offset: [u32; 2]) -> u64 {
+    let log2 = site.block_log2();
+    let mut shown = u64::MAX;
+    for which in site.chart(sheet).fields() {
+        let corners = site.field_corners(sheet, which, offset);
+        match field_cover(corners) {
+            Cover::Nothing => return 0,
+            Cover::Part => {
+                // What is below zero where the field is above. It bends nowhere: farthest from zero it is in a corner.
+                let reach = corners.iter().fold(0, |reach, corner| corner.unsigned_abs().max(reach));
+                shown &= negative(&Axis::new(corners.map(i32::wrapping_neg), [0; 2]), 0, reach, log2);
+            }
+            Cover::All => {}
+        }
     }
-    cover != Cover::Nothing
+    shown
 }
 
-/// At which pixels of a block `form`, which is nowhere further from zero than `reach` there, is below zero; whatever beside the block.
+/// At which pixels of a block `axis`, which is nowhere further from `edge` than `reach` there, is below it; whatever beside the block.
 // Called from several places, and long.
 #[inline(never)]
-fn negative(form: &Form, reach: u32, log2: u32) -> Shown {
-    let mut pairs = form.pairs(reach);
+fn negative(axis: &Axis, edge: i32, reach: u32, log2: u32) -> u64 {
+    let form = axis.form(log2);
+    let mut pairs = Form { at: form.at.wrapping_sub(edge), ..form }.pairs(reach);
     let mut four = || (0..4).fold(0, |rows, _| rows >> 8 | pairs.next_negative());
     let upper = four();
-    Shown([upper, if log2 == 2 { 0 } else { four() }])
+    let lower = if log2 == 2 { 0 } else { four() };
+    u64::from(lower) << 32 | u64::from(upper)
 }
 
 /// Those of the pixels that `shown` names whose texels the mask has.
-#[inline(always)]
-fn masked(shown: Shown, mut forms: [Form; 2], log2: u32, texture: &Texture<'_>) -> Shown {
-    Shown::rows(log2, |row| {
+#[inline(never)]
+fn masked(shown: Shown, patch: &Patch, log2: u32, texture: &Texture<'_>) -> u64 {
+    let mut forms = patch.forms(log2);
+    let Shown([upper, lower]) = Shown::rows(log2, |row| {
         let shown = shown.row(row);
         let covered = if shown == 0 { 0 } else { span::covered(shown, Span::new(&forms), texture) };
         forms.iter_mut().for_each(Form::next_row);
         covered
-    })
+    });
+    u64::from(lower) << 32 | u64::from(upper)
 }
 
 /// Which of a torn cell's `sheets` its block that is so far from its left upper corner can show, a bit each: those that cover part of it, in front of
@@ -266,7 +293,13 @@ pub fn candidates(site: &Site<'_, '_, '_>, offset: [u32; 2], sheets: &[Sheet]) -
             }
         }
         if sheet.test() != FIELD && cover != Cover::Nothing {
-            cover = cover.and(chart.cover(&site.block(&site.cell(sheet), offset).bounds(), &site.texture));
+            let bounds = site.block(sheet, offset).bounds();
+            let chart = match chart.misses(&bounds) {
+                true => Cover::Nothing,
+                false if chart.fills(&bounds, &site.texture) => Cover::All,
+                false => Cover::Part,
+            };
+            cover = cover.and(chart);
         }
         if cover != Cover::Nothing {
             shown |= bit;

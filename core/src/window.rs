@@ -151,26 +151,24 @@ impl Window {
         (rounded(x, 16u32.wrapping_add(bits).wrapping_add(self.width_log2).wrapping_sub(32).wrapping_add(log2)) as u32).wrapping_shl(bits)
     }
 
-    /// The tile of `patch`, which shows `label`, 2^`log2` pixels wide and high, in a window from `row` on.
-    #[must_use]
+    /// Puts the tile of `patch` into `slot`, which shows `label`, 2^`log2` pixels wide and high, in a window from `row` on.
     // Long, and called from two places.
     #[inline(never)]
-    pub fn tile(self, patch: &Patch, label: u8, row: u16, log2: u32) -> Tile {
+    pub fn put(self, slot: &mut Tile, patch: &Patch, label: u8, row: u16, log2: u32) {
         // What most bundles are made of has code of its own.
         let tile = match (self, log2) {
             (Self::USUAL, 3) => Self::USUAL.packed(patch, row, 3),
             (Self::SMALL, 3) => Self::SMALL.packed(patch, row, 3),
             _ => self.packed(patch, row, log2),
         };
-        tile.of(label, row)
+        *slot = tile.of(label, row);
     }
 
-    /// [`Window::tile`], written out where the window and `log2` are known.
+    /// [`Window::put`], written out where the window and `log2` are known.
     #[inline(always)]
     fn packed(self, patch: &Patch, row: u16, log2: u32) -> Tile {
-        // Each by name: a map over both would be a call.
-        let [(corners, sums), (corners_v, sums_v)] = patch.axes();
-        let (u, v) = (Middle::new(corners, sums, log2), Middle::new(corners_v, sums_v, log2));
+        let Patch { u, v } = patch;
+        let (u, v) = (Middle::new(u.corners, u.sums, log2), Middle::new(v.corners, v.sums, log2));
         let first = i32::from(row).wrapping_shl(16);
         let v = v.plus(first.wrapping_neg()).lanes(log2, |x, log2| self.lane::<true>(x, log2));
         v.plus(&u.lanes(log2, |x, log2| self.lane::<false>(x, log2))).from_middle(log2)
@@ -263,8 +261,10 @@ pub struct Room {
     pub window: Window,
     /// The margin: the least u, and the least v from the window's first row on.
     pub margin: i32,
-    /// What u is below.
+    /// What u is below,
     right: i32,
+    /// and v, from the window's first row on.
+    bottom: i32,
     /// The last window's first row, in the picture.
     last: i32,
 }
@@ -283,7 +283,8 @@ impl Room {
         let margin = margin(log2).wrapping_add(reach);
         let right = 1i32.wrapping_shl(window.width_log2.wrapping_add(16)).wrapping_sub(margin);
         let last = height.wrapping_sub(1u32.wrapping_shl(window.rows_log2)) as i32;
-        Some(Self { window, margin, right, last })
+        let bottom = 1i32.wrapping_shl(window.rows_log2.wrapping_add(16)).wrapping_sub(margin);
+        Some(Self { window, margin, right, bottom, last })
     }
 
     /// The first row of a window that holds what lies within `bounds`: `near` if that does, else one that begins there, as far as the picture goes; `None`
@@ -295,7 +296,10 @@ impl Room {
         if low.u < self.margin || high.u >= self.right {
             return None;
         }
-        let holds = |row: i32| self.holds(low.v, high.v, row, self.margin);
+        let holds = |row: i32| {
+            let first = row.wrapping_shl(16);
+            low.v.wrapping_sub(first) >= self.margin && high.v.wrapping_sub(first) < self.bottom
+        };
         if holds(near.into()) {
             return Some(near);
         }
