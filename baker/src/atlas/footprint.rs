@@ -75,43 +75,57 @@ impl<'a> Footprints<'a> {
         self.members.par_iter().enumerate().map(of).collect()
     }
 
-    /// Adds the texels that pixels see: faces may be too thin for a colour sample.
-    pub fn add_seen(&self, masks: &mut [Mask]) {
-        let places: Vec<Place> = masks.iter().enumerate().map(|(chart, m)| self.place(chart, [m.width, m.height])).collect();
-        let mut start = vec![0];
-        for m in masks.iter() {
-            start.push(start[start.len() - 1] + m.width as usize * m.height as usize);
-        }
-        let seen: Vec<AtomicU64> = (0..start[masks.len()].div_ceil(64)).map(|_| AtomicU64::new(0)).collect();
+    /// Adds the texels that pixels see, to the charts' masks of each of some sizes: faces may be too thin for a colour sample.
+    pub fn add_seen(&self, levels: &mut [Vec<Mask>]) {
+        let alone =
+            |masks: &Vec<Mask>| -> Vec<Place> { masks.iter().enumerate().map(|(i, m)| self.place(i, [m.width, m.height])).collect() };
+        let places: Vec<Vec<Place>> = levels.iter().map(alone).collect();
+        // Where each chart's bits start, level by level.
+        let mut bits = 0;
+        let mut start = |m: &Mask| {
+            bits += m.width as usize * m.height as usize;
+            bits - m.width as usize * m.height as usize
+        };
+        let starts: Vec<Vec<usize>> = levels.iter().map(|masks| masks.iter().map(&mut start).collect()).collect();
+        let seen: Vec<AtomicU64> = (0..bits.div_ceil(64)).map(|_| AtomicU64::new(0)).collect();
         self.hits.samples.par_chunks(1 << 16).for_each(|samples| {
             for s in samples.iter().filter(|s| s.surface != BACKGROUND) {
                 let face = self.charting.faces.of[s.surface as usize] as usize;
                 let chart = self.charting.chart_of[face] as usize;
-                let at = places[chart].at(self.charting.flat(face, f64::from(s.b), f64::from(s.c)));
-                let [w, h] = [masks[chart].width, masks[chart].height];
-                let texels = |k: usize, size: u32| {
-                    let texel = |v: f64| v.clamp(0.0, f64::from(size - 1)) as usize;
-                    texel(at[k] - CLOSE)..=texel(at[k] + CLOSE)
-                };
-                for y in texels(1, h) {
-                    for x in texels(0, w) {
-                        let i = start[chart] + y * w as usize + x;
-                        let (word, bit) = (&seen[i / 64], 1 << (i % 64));
-                        // Most texels are seen again and again: looking is cheaper than writing.
-                        if word.load(Ordering::Relaxed) & bit == 0 {
-                            word.fetch_or(bit, Ordering::Relaxed);
-                        }
+                let flat = self.charting.flat(face, f64::from(s.b), f64::from(s.c));
+                for (places, starts) in places.iter().zip(&starts) {
+                    mark(&seen, starts[chart], &places[chart], flat);
+                }
+            }
+        });
+        for (masks, starts) in levels.iter_mut().zip(&starts) {
+            masks.par_iter_mut().zip(starts).for_each(|(mask, &start)| {
+                for i in 0..mask.width * mask.height {
+                    let at = start + i as usize;
+                    if seen[at / 64].load(Ordering::Relaxed) >> (at % 64) & 1 == 1 {
+                        mask.set(i % mask.width, i / mask.width);
                     }
                 }
+            });
+        }
+    }
+}
+
+/// Sets the bits, from `start` on, of the texels that flattened coordinates may fall into in a chart that lies alone.
+fn mark(seen: &[AtomicU64], start: usize, place: &Place, flat: [f64; 3]) {
+    let (at, [_, _, w, h]) = (place.at(flat), place.rect);
+    let texels = |k: usize, size: u32| {
+        let texel = |v: f64| v.clamp(0.0, f64::from(size - 1)) as usize;
+        texel(at[k] - CLOSE)..=texel(at[k] + CLOSE)
+    };
+    for y in texels(1, h) {
+        for x in texels(0, w) {
+            let i = start + y * w as usize + x;
+            let (word, bit) = (&seen[i / 64], 1 << (i % 64));
+            // Most texels are seen again and again: looking is cheaper than writing.
+            if word.load(Ordering::Relaxed) & bit == 0 {
+                word.fetch_or(bit, Ordering::Relaxed);
             }
-        });
-        masks.par_iter_mut().zip(&start).for_each(|(mask, &start)| {
-            for i in 0..mask.width * mask.height {
-                let at = start + i as usize;
-                if seen[at / 64].load(Ordering::Relaxed) >> (at % 64) & 1 == 1 {
-                    mask.set(i % mask.width, i / mask.width);
-                }
-            }
-        });
+        }
     }
 }

@@ -4,12 +4,15 @@
 mod fill;
 mod footprint;
 mod grid;
+mod grow;
 mod halve;
+mod items;
 mod mask;
 mod outline;
 mod pack;
 mod palette;
 mod place;
+mod search;
 mod strip;
 
 use crate::chart::{self, Charting, Choice, Density, Family};

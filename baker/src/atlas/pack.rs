@@ -2,14 +2,13 @@
 //! Charts come measured from the charting, their masks from `footprint`; places go to the G-buffer and the colouring.
 
 use super::footprint::Footprints;
+use super::grow::Growing;
+use super::items::{Items, QUICK, worth};
 use super::mask::Mask;
 use super::place::Place;
-use super::strip::{Shape, Spot, Strip};
+use super::search::Laid;
+use super::strip::Spot;
 use crate::chart::{Chart, Charting};
-use cubist_core::window::Window;
-use rayon::prelude::*;
-use std::cmp::Reverse;
-use std::ops::Range;
 
 /// Texels between charts: one, so that what lies just beyond an edge is not another chart, and none where nothing else fits.
 const NARROW: [u32; 2] = [1, 0];
@@ -22,23 +21,13 @@ const STEPS: i32 = 12;
 const STEP: f64 = 1.01;
 /// Ever longer steps back from what bisection finds, until what is seen but not drawn fits too.
 const BACK: i32 = 40;
-/// Texels that an image may be larger by for windows: without them the player draws pixel by pixel, which takes two to four times as long.
-const WINDOWED: u32 = 4096;
-/// Rows that an image may be given for that.
-const ROWS: [u32; 3] = [16, 64, 128];
 /// Rows that an image may be taller by for a texel between its edges and all charts.
 const RIM_ROWS: u32 = 4;
 /// Images of fewer rows than this are not: it would be too much of them.
 const SMALL: u32 = 128;
-/// Scales tried where everything fits and the image has room left, the largest first: texels that cost nothing.
-const FREE: [f64; 9] = [1.4, 1.32, 1.25, 1.19, 1.14, 1.1, 1.06, 1.03, 1.01];
-/// Orders for searching a scale; all are tried at the scale found.
-const QUICK: usize = 3;
-/// Shuffled orders, fewer where there are many charts to lay down in each.
-const SHUFFLED: usize = 40;
-const CHARTS: usize = 8192;
-/// Times that a chart is laid down earlier because there was no room for it, at most.
-const PROMOTIONS: usize = 200;
+/// How much finer charts get at a time where the image has room left, and how many times at most.
+const FINER: f64 = 1.04;
+const TIMES: i32 = 18;
 
 /// Where everything lies.
 pub(crate) struct Layout {
@@ -61,122 +50,6 @@ impl Layout {
     pub fn worth(&self) -> u32 {
         worth([self.width, self.height])
     }
-}
-
-/// Masks in all their turns: the background's, then the charts'.
-struct Items {
-    shapes: Vec<Vec<Shape>>,
-    /// Their sizes, straight.
-    sizes: Vec<[u32; 2]>,
-    area: u64,
-    /// Orders to lay them down in.
-    orders: Vec<Vec<usize>>,
-}
-
-impl Items {
-    fn new(backdrop: [u32; 2], charts: &[Mask]) -> Self {
-        let first = Mask::full(backdrop[0], backdrop[1]);
-        let masks: Vec<&Mask> = std::iter::once(&first).chain(charts).collect();
-        // The background is fixed to the screen, which does not turn.
-        let shapes = masks.par_iter().enumerate().map(|(i, mask)| Shape::turns(mask, i > 0)).collect();
-        let keys: [fn(&Mask) -> u32; 3] = [|m| m.area(), |m| m.width.max(m.height), |m| m.width + m.height];
-        let order = |key: fn(&Mask) -> u32| {
-            let mut order: Vec<usize> = (0..masks.len()).collect();
-            order.sort_by_cached_key(|&i| (Reverse((key(masks[i]), masks[i].area())), i));
-            order
-        };
-        let mut orders = Vec::from(keys.map(order));
-        for seed in 0..(CHARTS / masks.len()).min(SHUFFLED) as u32 {
-            // By area, but each multiplied by something between 0.5 and 1.5.
-            let chance = |i: usize| {
-                let mixed = (i as u32 ^ seed << 16).wrapping_mul(2_654_435_761);
-                (mixed ^ mixed >> 15).wrapping_mul(2_246_822_519) >> 16
-            };
-            let mut order: Vec<usize> = (0..masks.len()).collect();
-            order.sort_by_cached_key(|&i| (Reverse(u64::from(masks[i].area()) * u64::from((1 << 15) + chance(i))), i));
-            orders.push(order);
-        }
-        let area = masks.iter().map(|m| u64::from(m.area())).sum();
-        Self { shapes, sizes: masks.iter().map(|m| [m.width, m.height]).collect(), area, orders }
-    }
-
-    /// Lays everything down in order `order`, so many texels between charts and around them all; the height, and the spots.
-    fn lay(&self, order: usize, size: [u32; 2], apart: [u32; 2]) -> Option<(u32, Vec<Spot>)> {
-        self.lay_in(&self.orders[order], size, apart).ok()
-    }
-
-    /// The same in any order; or the place in it of the first that there is no room for.
-    fn lay_in(&self, order: &[usize], [width, height]: [u32; 2], [gutter, rim]: [u32; 2]) -> Result<(u32, Vec<Spot>), usize> {
-        if self.area > u64::from(width) * u64::from(height) {
-            return Err(0);
-        }
-        let mut strip = Strip::new(width, height, gutter, rim);
-        let mut spots = vec![Spot { x: 0, y: 0, turns: 0 }; self.shapes.len()];
-        for (at, &i) in order.iter().enumerate() {
-            spots[i] = strip.place(&self.shapes[i]).ok_or(at)?;
-        }
-        Ok((strip.height, spots))
-    }
-
-    /// The spots in an image of this size, in the first of a few orders in which everything fits: of all orders there are, or of such that come about
-    /// when what finds no room is laid down earlier, again and again (D. Joslin and D. Clements, "Squeaky wheel optimization", 1999).
-    fn at_all(&self, size: [u32; 2], apart: [u32; 2]) -> Option<Vec<Spot>> {
-        let eager = |order: usize| {
-            let mut order = self.orders[order].clone();
-            for _ in 0..(CHARTS / order.len()).min(PROMOTIONS) {
-                match self.lay_in(&order, size, apart) {
-                    Ok((_, spots)) => return Some(spots),
-                    Err(0) => return None,
-                    Err(at) => order[at / 2..=at].rotate_right(1),
-                }
-            }
-            None
-        };
-        self.in_any_order(usize::MAX, size, apart).or_else(|| (0..QUICK).into_par_iter().find_map_first(eager))
-    }
-
-    /// The spots in an image of this size, in the first of so many orders in which everything fits.
-    fn in_any_order(&self, orders: usize, size: [u32; 2], apart: [u32; 2]) -> Option<Vec<Spot>> {
-        (0..orders.min(self.orders.len())).into_par_iter().find_map_first(|order| self.lay(order, size, apart)).map(|(_, spots)| spots)
-    }
-
-    /// The smallest image that one of the orders makes: its size, and the spots.
-    fn smallest(&self, side: u32, most: u32, gutter: u32) -> Option<([u32; 2], Vec<Spot>)> {
-        let best = self.smaller(0..QUICK, side, gutter, |_| most)?;
-        // The others need not be laid down to the end where they come to no less.
-        let texels = worth(best.0) - 1;
-        let less = |wide: u32| {
-            let texels = if windowed([wide, u32::MAX]) { texels } else { texels.saturating_sub(WINDOWED) };
-            (texels / wide / 4 * 4).min(most)
-        };
-        let other = self.smaller(QUICK..self.orders.len(), side, gutter, less);
-        other.filter(|(size, _)| worth(*size) <= texels).or(Some(best))
-    }
-
-    /// The smallest image that some of the orders make, of at most `most` rows for its width.
-    fn smaller(&self, orders: Range<usize>, side: u32, gutter: u32, most: impl Fn(u32) -> u32 + Sync) -> Option<([u32; 2], Vec<Spot>)> {
-        let widths = (6..=side.ilog2()).rev().map(|log2| 1 << log2);
-        let tries: Vec<(u32, usize)> = widths.flat_map(|width| orders.clone().map(move |order| (width, order))).collect();
-        let of = |(i, &(width, order)): (usize, &(u32, usize))| {
-            let (height, spots) = self.lay(order, [width, most(width)], [gutter, 0])?;
-            let height = height.next_multiple_of(4);
-            let taller = ROWS.into_iter().filter(|&rows| rows > height && rows <= most(width));
-            let size = std::iter::once(height).chain(taller).map(|height| [width, height]).min_by_key(|&size| worth(size))?;
-            Some((worth(size), i, size, spots))
-        };
-        let best = tries.par_iter().enumerate().filter_map(of).min_by_key(|&(worth, i, ..)| (worth, i));
-        best.map(|(_, _, size, spots)| (size, spots))
-    }
-}
-
-/// The player has windows in images of this size.
-fn windowed([width, height]: [u32; 2]) -> bool {
-    Window::new(width.ilog2(), height).is_some()
-}
-
-/// What an image of this size takes, texels, windows among them.
-fn worth([width, height]: [u32; 2]) -> u32 {
-    width * height + if windowed([width, height]) { 0 } else { WINDOWED }
 }
 
 /// The sides of a chart, texels.
@@ -231,16 +104,13 @@ pub(super) fn pack(footprints: &Footprints<'_>, backdrop: [u32; 2], max_side: u3
     NARROW.into_iter().find_map(|gutter| Packing { footprints, backdrop, max_side }.with(gutter))
 }
 
-/// Everything once more, as much finer as there is room for in the image that `layout` takes anyhow; it has all the density that is worth its bytes. Charts
-/// that have all that can be seen, and those as wide or high as the image, stay as they are.
+/// Everything once more, in an image of fewer rows than `layout` where a search finds one, and with charts as much finer as there is room for: they have
+/// all the density that is worth its bytes. Charts that have all that can be seen, and those as wide or high as the image, stay as they are.
 pub(super) fn filled(footprints: &Footprints<'_>, backdrop: [u32; 2], max_side: u32, layout: Layout) -> Layout {
-    let spares = footprints.charting.charts.iter().any(|chart| chart.finest > chart.density);
-    if !spares || layout.scale < 1.0 {
+    if layout.scale < 1.0 || layout.gutter == 0 {
         return layout;
     }
-    let packing = Packing { footprints, backdrop, max_side };
-    let finer = FREE.into_iter().find_map(|scale| packing.finer(&layout, scale));
-    finer.unwrap_or(layout)
+    Packing { footprints, backdrop, max_side }.filled(&layout).unwrap_or(layout)
 }
 
 /// What there is to pack, and the room for it.
@@ -261,7 +131,7 @@ impl Packing<'_> {
         let [side, _] = self.room();
         let mut masks = self.footprints.drawn(&sizes(self.footprints.charting, scale, side), scale);
         if seen {
-            self.footprints.add_seen(&mut masks);
+            self.footprints.add_seen(std::slice::from_mut(&mut masks));
         }
         Items::new(scaled(self.backdrop, scale, self.room()[0]), &masks)
     }
@@ -288,18 +158,33 @@ impl Packing<'_> {
         None
     }
 
-    /// The layout at a larger scale, if that fits the same image.
-    fn finer(&self, layout: &Layout, scale: f64) -> Option<Layout> {
-        let size = [layout.width, layout.height];
-        let sizes = sizes_within(self.footprints.charting, scale, size.map(|side| side - 2 * layout.rim));
-        let mut masks = self.footprints.drawn(&sizes, scale);
-        let spots = |items: &Items| items.at_all(size, [NARROW[0], layout.rim]);
-        // What finds no room so finds none with what is seen but not drawn, which takes long to tell.
-        spots(&Items::new(self.backdrop, &masks))?;
+    /// The layout in a smaller image, with finer charts, or both, if there is one.
+    fn filled(&self, layout: &Layout) -> Option<Layout> {
+        let charts = &self.footprints.charting.charts;
+        let items = self.items(1.0, true);
+        let (size, rim, laid) = shrunk(&items, layout)?;
+        let spares = charts.iter().any(|chart| chart.finest > chart.density);
+        if !spares && (size[1], rim) == (layout.height, layout.rim) {
+            return None;
+        }
+        let room = size.map(|side| side - 2 * rim);
+        let scales: Vec<f64> = (0..=if spares { TIMES } else { 0 }).map(|times| FINER.powi(times)).collect();
+        let masks = scales.iter().map(|&scale| self.footprints.drawn(&sizes_within(self.footprints.charting, scale, room), scale));
+        let mut masks: Vec<Vec<Mask>> = masks.collect();
         self.footprints.add_seen(&mut masks);
-        let items = Items::new(self.backdrop, &masks);
-        let spots = spots(&items)?;
-        Some(self.wider(&items, size, spots, scale, [NARROW[0], layout.rim]))
+        let levels: Vec<Items> = masks.iter().map(|masks| Items::new(self.backdrop, masks)).collect();
+        // A texel more is worth more where more pixels see the chart, and where they could see more of it: as the charting weighs them.
+        let worth = |i: usize, level: usize| {
+            let Chart { density, finest, hits, .. } = &charts[i - 1];
+            let missing = libm::log2(finest / (density * scales[level])).max(0.0);
+            *hits as f64 * missing / f64::from(levels[level].shapes[i][0].area.max(1))
+        };
+        let growing = Growing { levels: &levels, size, apart: [NARROW[0], rim], steps: items.steps() };
+        let (of, laid) = growing.grown(laid, worth);
+        let chosen: Vec<Mask> = of[1..].iter().enumerate().map(|(chart, &level)| masks[level][chart].clone()).collect();
+        let area = |masks: &[Mask]| masks.iter().map(|mask| f64::from(mask.area())).sum::<f64>();
+        let scale = (area(&chosen) / area(&masks[0]).max(1.0)).sqrt();
+        Some(self.wider(&Items::new(self.backdrop, &chosen), size, laid.spots, scale, [NARROW[0], rim]))
     }
 
     /// Takes more room around and between charts where it is free, or next to it: at the picture's edges players draw pixel by pixel, and what is thought to
@@ -320,6 +205,19 @@ impl Packing<'_> {
         let found = wider.find_map(|wide| Some((wide, items.in_any_order(usize::MAX, size, [wide, rim])?)));
         let (gutter, spots) = found.unwrap_or((gutter, spots));
         finish(self.footprints.charting, &items.sizes, &spots, size, scale, [gutter, rim])
+    }
+}
+
+/// The smallest image, no larger than that of `layout`, that a search fits everything into; the texels around it, and how it lies there.
+fn shrunk(items: &Items, layout: &Layout) -> Option<([u32; 2], u32, Laid)> {
+    let found = |size: [u32; 2], rim: u32| Some((size, rim, items.search(size, [NARROW[0], rim]).found(&items.orders, items.steps())?));
+    let size = [layout.width, layout.height];
+    let mut best = found(size, 1).or_else(|| found(size, layout.rim))?;
+    loop {
+        let [width, height] = best.0;
+        let less = Some([width, height - 4]).filter(|&less| height > 4 && worth(less) < worth(best.0));
+        let Some(found) = less.and_then(|less| found(less, best.1)) else { return Some(best) };
+        best = found;
     }
 }
 

@@ -6,13 +6,13 @@ use super::mask::{Mask, Run, next};
 /// The most words a row has: 1024 texels.
 const WORDS: usize = 16;
 
-type Row = [u64; WORDS];
-
 /// A mask in one of its four turns.
 pub(super) struct Shape {
     pub turns: u8,
     width: u32,
     height: u32,
+    /// Texels in it.
+    pub area: u32,
     /// The longest first: they are the first to be in the way.
     runs: Vec<Run>,
 }
@@ -29,7 +29,7 @@ impl Shape {
             if !masks[..usize::from(turns)].contains(mask) {
                 let mut runs = mask.runs();
                 runs.sort_by_key(|run| (std::cmp::Reverse(run.length), run.row, run.start));
-                out.push(Self { turns, width: mask.width, height: mask.height, runs });
+                out.push(Self { turns, width: mask.width, height: mask.height, area: mask.area(), runs });
             }
         }
         out
@@ -58,8 +58,10 @@ pub(super) struct Strip {
     pub height: u32,
     /// Levels a row has.
     levels: usize,
+    /// Words a level of a row has.
+    words: usize,
     /// Level k of a row says for each texel whether one of the 2^k from it on is taken, gutters included: two of them tell of any run.
-    taken: Vec<Row>,
+    taken: Vec<u64>,
     /// The longest run of free texels in each row.
     free: Vec<u32>,
 }
@@ -67,7 +69,7 @@ pub(super) struct Strip {
 impl Strip {
     /// An empty strip, `width` texels wide, a power of two up to 1024.
     pub fn new(width: u32, most: u32, gutter: u32, rim: u32) -> Self {
-        let levels = width.ilog2() as usize + 1;
+        let (levels, words) = (width.ilog2() as usize + 1, width as usize / 64);
         Self {
             width,
             most,
@@ -75,7 +77,8 @@ impl Strip {
             rim,
             height: 0,
             levels,
-            taken: vec![[0; WORDS]; levels * most as usize],
+            words,
+            taken: vec![0; words * levels * most as usize],
             free: vec![width; most as usize],
         }
     }
@@ -101,7 +104,7 @@ impl Strip {
         let right = self.width.checked_sub(shape.width + rim)?;
         // What has no texels lies anywhere.
         let longest = shape.runs.first().copied().unwrap_or(Run { row: 0, start: 0, length: 0 });
-        let words = self.width as usize / 64;
+        let words = self.words;
         // A set bit is a column that the shape's left edge cannot lie in.
         let mut outside = [u64::MAX; WORDS];
         (rim..=right).for_each(|x| outside[x as usize / 64] &= !(1 << (x % 64)));
@@ -116,10 +119,10 @@ impl Strip {
             let mut blocked = outside;
             for run in &shape.runs {
                 let level = run.length.ilog2();
-                let row = &self.taken[(y + run.row) as usize * self.levels + level as usize];
-                block(&mut blocked[..words], &row[..words], run.start);
+                let row = &self.taken[((y + run.row) as usize * self.levels + level as usize) * words..][..words];
+                block(&mut blocked[..words], row, run.start);
                 if run.length > 1 << level {
-                    block(&mut blocked[..words], &row[..words], run.start + run.length - (1 << level));
+                    block(&mut blocked[..words], row, run.start + run.length - (1 << level));
                 }
                 if blocked[..words].iter().all(|&word| word == u64::MAX) {
                     break;
@@ -134,24 +137,24 @@ impl Strip {
     }
 
     /// Marks a shape and its gutter as taken.
-    fn take(&mut self, shape: &Shape, spot: Spot) {
-        let gutter = self.gutter;
-        let words = self.width as usize / 64;
+    pub fn take(&mut self, shape: &Shape, spot: Spot) {
+        let (gutter, words) = (self.gutter, self.words);
+        let all = words * self.levels;
         for run in &shape.runs {
             let (left, right) = ((spot.x + run.start).saturating_sub(gutter), (spot.x + run.start + run.length + gutter).min(self.width));
             let row = spot.y + run.row;
             for y in row.saturating_sub(gutter)..(row + gutter + 1).min(self.most) {
-                set(&mut self.taken[y as usize * self.levels], left, right);
+                set(&mut self.taken[y as usize * all..][..words], left, right);
             }
         }
         for y in spot.y.saturating_sub(gutter)..(spot.y + shape.height + gutter).min(self.most) {
-            let row = &mut self.taken[y as usize * self.levels..][..self.levels];
+            let row = &mut self.taken[y as usize * all..][..all];
             for level in 1..self.levels {
-                row[level] = row[level - 1];
-                let [below, here] = &mut row[level - 1..=level] else { continue };
-                block(&mut here[..words], &below[..words], 1 << (level - 1));
+                let (below, here) = row[(level - 1) * words..(level + 1) * words].split_at_mut(words);
+                here.copy_from_slice(below);
+                block(here, below, 1 << (level - 1));
             }
-            self.free[y as usize] = longest_free(&row[0][..words], self.width);
+            self.free[y as usize] = longest_free(&row[..words], self.width);
         }
         self.height = self.height.max(spot.y + shape.height + self.rim);
     }
@@ -170,7 +173,7 @@ fn block(out: &mut [u64], row: &[u64], by: u32) {
 }
 
 /// Sets the bits `left`..`right`.
-fn set(row: &mut Row, left: u32, right: u32) {
+fn set(row: &mut [u64], left: u32, right: u32) {
     for (i, word) in row.iter_mut().enumerate().take(right.div_ceil(64) as usize).skip(left as usize / 64) {
         let at = i as u32 * 64;
         let (from, to) = (left.max(at) - at, right.min(at + 64) - at);

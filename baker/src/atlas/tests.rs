@@ -276,7 +276,7 @@ fn texels_lie_in_their_own_charts_footprint() {
         for side in [64, 512] {
             let layout = pack::pack(&footprints, [4, 4], side).expect("a layout");
             let mut masks = footprints.drawn(&layout.places.iter().map(place::Place::size).collect::<Vec<_>>(), layout.scale);
-            footprints.add_seen(&mut masks);
+            footprints.add_seen(std::slice::from_mut(&mut masks));
             // The chart of every texel, from the masks, turned as their places are.
             let mut owner = vec![None; (layout.width * layout.height) as usize];
             for (chart, (mask, place)) in masks.iter().zip(&layout.places).enumerate() {
