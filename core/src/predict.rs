@@ -417,3 +417,52 @@ impl Neighbours {
         (self.behind, self.north) = (self.north, self.ahead);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{BASES, Base, Bits, Probability, tell};
+    use heapless::Vec;
+
+    /// Bits as they are written, or, once they are `kept`, read again.
+    #[derive(Default)]
+    struct Tape {
+        bits: Vec<bool, 8>,
+        kept: Option<usize>,
+    }
+
+    impl Bits for Tape {
+        fn bit(&mut self, _: &mut Probability, bit: bool) -> bool {
+            match &mut self.kept {
+                None => self.bits.push(bit).is_ok() && bit,
+                Some(at) => {
+                    let bit = self.bits.get(*at).copied().unwrap_or_default();
+                    *at = at.wrapping_add(1);
+                    bit
+                }
+            }
+        }
+
+        fn flat(&mut self, _: u32, value: u32) -> u32 {
+            value
+        }
+    }
+
+    #[test]
+    fn any_base_can_be_told_whatever_is_expected() {
+        for expected in Base::ALL {
+            for wanted in Base::ALL {
+                let mut contexts = [Probability::NEW; BASES * Base::ALL.len()];
+                let mut tape = Tape::default();
+                assert_eq!(tell(&mut tape, &mut contexts, expected, wanted), wanted);
+                let length = tape.bits.len();
+                assert!(
+                    if wanted == expected { length == 1 } else { (2..=BASES).contains(&length) },
+                    "{expected:?} {wanted:?}: {length} bits"
+                );
+                tape.kept = Some(0);
+                assert_eq!(tell(&mut tape, &mut contexts, expected, Base::default()), wanted);
+                assert_eq!(tape.kept, Some(length));
+            }
+        }
+    }
+}
