@@ -10,6 +10,8 @@ use std::cmp::Reverse;
 const EACH: usize = 8;
 /// So many times as many are tried for all charts together as for an image from each of a few orders.
 const ALL: usize = 4;
+/// Ways to grow are tried for all of so many charts together, but one in any case.
+const CHARTS: usize = 128;
 
 /// What tells which item gets finer next: of an item and its level.
 type Rule<'a> = dyn Fn(usize, usize) -> f64 + Sync + 'a;
@@ -35,6 +37,7 @@ impl Growing<'_> {
         let starts = [(level, alike), (0, laid)];
         // The first of two that are the same is enough.
         let tries = starts.into_iter().take(if level > 0 { 2 } else { 1 }).flat_map(|start| rules.map(|rule| (start.clone(), rule)));
+        let tries = tries.take((CHARTS / self.levels[0].shapes.len()).max(1));
         let tries: Vec<((usize, Laid), &Rule<'_>)> = tries.collect();
         let grown = |((level, laid), rule): ((usize, Laid), &Rule<'_>)| self.one_by_one(level, laid, rule);
         let mut grown: Vec<(Vec<usize>, Laid)> = tries.into_par_iter().map(grown).collect();

@@ -18,8 +18,9 @@ pub(super) const QUICK: usize = 3;
 /// Shuffled orders, fewer where there are many charts to lay down in each.
 const SHUFFLED: usize = 40;
 const CHARTS: usize = 8192;
-/// Steps of a search for an order, fewer where there are many charts.
+/// Steps of a search for an order, fewer where there are many charts, or many texels to find room among.
 const STEPS: usize = 400;
+const TEXELS: usize = 1 << 22;
 
 /// Masks in all their turns: the background's, then the charts'.
 pub(super) struct Items {
@@ -71,9 +72,9 @@ impl Items {
         Some((strip.height, spots))
     }
 
-    /// Steps that a search for an order is worth.
-    pub fn steps(&self) -> usize {
-        (2 * CHARTS / self.shapes.len()).min(STEPS)
+    /// Steps that a search for an order is worth in an image of this size.
+    pub fn steps(&self, [width, height]: [u32; 2]) -> usize {
+        (2 * CHARTS / self.shapes.len()).min(TEXELS / (width * height) as usize).min(STEPS)
     }
 
     /// The search for an order in which everything fits an image of this size.

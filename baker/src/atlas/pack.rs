@@ -179,7 +179,7 @@ impl Packing<'_> {
             let missing = libm::log2(finest / (density * scales[level])).max(0.0);
             *hits as f64 * missing / f64::from(levels[level].shapes[i][0].area.max(1))
         };
-        let growing = Growing { levels: &levels, size, apart: [NARROW[0], rim], steps: items.steps() };
+        let growing = Growing { levels: &levels, size, apart: [NARROW[0], rim], steps: items.steps(size) };
         let (of, laid) = growing.grown(laid, worth);
         let chosen: Vec<Mask> = of[1..].iter().enumerate().map(|(chart, &level)| masks[level][chart].clone()).collect();
         let area = |masks: &[Mask]| masks.iter().map(|mask| f64::from(mask.area())).sum::<f64>();
@@ -210,7 +210,7 @@ impl Packing<'_> {
 
 /// The smallest image, no larger than that of `layout`, that a search fits everything into; the texels around it, and how it lies there.
 fn shrunk(items: &Items, layout: &Layout) -> Option<([u32; 2], u32, Laid)> {
-    let found = |size: [u32; 2], rim: u32| Some((size, rim, items.search(size, [NARROW[0], rim]).found(&items.orders, items.steps())?));
+    let found = |size: [u32; 2], rim: u32| Some((size, rim, items.search(size, [NARROW[0], rim]).found(&items.orders, items.steps(size))?));
     let size = [layout.width, layout.height];
     let mut best = found(size, 1).or_else(|| found(size, layout.rim))?;
     loop {
