@@ -276,6 +276,13 @@ impl Cells<'_> {
         self.room.margin.wrapping_add(BULGE)
     }
 
+    /// How much of 2^`log2` texels of a window is further than that from its edges, Q16. Counted from the margin on, what is inside is not negative and below
+    /// this, one comparison for both.
+    #[inline(always)]
+    const fn within(&self, log2: u32) -> u32 {
+        1u32.wrapping_shl(log2.wrapping_add(16)).wrapping_sub((self.margin() as u32).wrapping_mul(2))
+    }
+
     /// The kind of window, which may be known to be the `USUAL` one.
     #[inline(always)]
     const fn window_of<const USUAL: bool>(&self) -> Window {
@@ -326,8 +333,7 @@ fn lay_down<const TILES: usize, const USUAL: bool, T: Place>(
     let window = cells.window_of::<USUAL>();
     let v = |layer: Layer| layer.uv().v;
     let margin = cells.margin();
-    // From the margin on: inside is what is not negative and below the room, one comparison for both.
-    let room = 1u32.wrapping_shl(window.rows_log2.wrapping_add(16)).wrapping_sub((margin as u32).wrapping_mul(2));
+    let room = cells.within(window.rows_log2);
     let inside = |v: i32, row: i32| (v.wrapping_sub(row.wrapping_shl(16)).wrapping_sub(margin) as u32) < room;
     let mut row = i32::from(cells.near);
     let mut edges = above.iter().zip(below);
@@ -366,8 +372,7 @@ fn lay_across<const TILES: usize, const USUAL: bool, T: Place>(
 ) -> usize {
     let window = cells.window_of::<USUAL>();
     let margin = cells.margin();
-    // From the margin on: inside is what is not negative and below the room, one comparison for both.
-    let room = 1u32.wrapping_shl(window.width_log2.wrapping_add(16)).wrapping_sub((margin as u32).wrapping_mul(2));
+    let room = cells.within(window.width_log2);
     let u = |layer: Layer| layer.uv().u;
     let at = |node: &T| u(node.layer()).wrapping_sub(margin);
     let mut edges = above.iter().zip(below);

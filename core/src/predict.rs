@@ -13,11 +13,12 @@ use crate::plane::Across;
 
 /// Classes of how large the residuals were around a layer.
 const NOISE_CLASSES: usize = 9;
-/// Contexts of positions; behind them those of bases, for each that may be expected one less than there are.
-const POSITIONS: usize = NOISE_CLASSES * 2 * NUMBER_CONTEXTS;
-/// Contexts positions are coded with.
-pub const CONTEXTS: usize = POSITIONS + Base::ALL.len() * BASES;
+/// Contexts of residuals.
+const RESIDUALS: usize = NOISE_CLASSES * 2 * NUMBER_CONTEXTS;
+/// Contexts of the base where one is expected: whether it is each of them, but for the last.
 const BASES: usize = Base::ALL.len() - 1;
+/// Contexts positions are coded with: those of residuals, then those of bases, for each that may be expected.
+pub const CONTEXTS: usize = RESIDUALS + Base::ALL.len() * BASES;
 
 /// Codes the positions of the layers of `chain`, in row `row` of `key`, in `contexts` ([`CONTEXTS`] of them): what they are told from, and for each a
 /// residual. Their `traces` have their marks.
@@ -33,13 +34,13 @@ pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
     chain: Chain,
     source: &mut S,
 ) {
-    let Some((positions, bases)) = contexts.split_at_mut_checked(POSITIONS) else { return };
+    let Some((residuals, bases)) = contexts.split_at_mut_checked(RESIDUALS) else { return };
     let expected = expected(key, traces, row, chain);
     let wanted = source.base(expected, |source, base| {
-        walk(&mut Trial, positions, setting, key, traces, (row, base), chain, source);
+        walk(&mut Trial, residuals, setting, key, traces, (row, base), chain, source);
     });
     let base = tell(bits, bases, expected, wanted);
-    walk(bits, positions, setting, key, traces, (row, base), chain, source);
+    walk(bits, residuals, setting, key, traces, (row, base), chain, source);
 }
 
 /// The bits of a trial go nowhere, and teach nothing.

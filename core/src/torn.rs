@@ -79,6 +79,13 @@ impl Shown {
         Self([bits as u32, (bits >> 32) as u32])
     }
 
+    /// Likewise as one number.
+    #[inline(always)]
+    const fn bits(self) -> u64 {
+        let [low, high] = self.0;
+        (high as u64) << 32 | low as u64
+    }
+
     /// How many they are.
     #[inline(always)]
     const fn count(self) -> u32 {
@@ -260,20 +267,20 @@ fn negative(axis: &Axis, edge: i32, reach: u32, log2: u32) -> u64 {
     let mut four = || (0..4).fold(0, |rows, _| rows >> 8 | pairs.next_negative());
     let upper = four();
     let lower = if log2 == 2 { 0 } else { four() };
-    u64::from(lower) << 32 | u64::from(upper)
+    Shown([upper, lower]).bits()
 }
 
 /// Those of the pixels that `shown` names whose texels the mask has.
 #[inline(never)]
 fn masked(shown: Shown, patch: &Patch, log2: u32, texture: &Texture<'_>) -> u64 {
     let mut forms = patch.forms(log2);
-    let Shown([upper, lower]) = Shown::rows(log2, |row| {
+    let covered = Shown::rows(log2, |row| {
         let shown = shown.row(row);
         let covered = if shown == 0 { 0 } else { span::covered(shown, Span::new(&forms), texture) };
         forms.iter_mut().for_each(Form::next_row);
         covered
     });
-    u64::from(lower) << 32 | u64::from(upper)
+    covered.bits()
 }
 
 /// Which of a torn cell's `sheets` its block that is so far from its left upper corner can show, a bit each: those that cover part of it, in front of

@@ -3,7 +3,7 @@
 
 use super::mask::Mask;
 use super::search::Search;
-use super::strip::{Shape, Spot, Strip};
+use super::strip::{Shape, Spot};
 use cubist_core::window::Window;
 use rayon::prelude::*;
 use std::cmp::Reverse;
@@ -27,7 +27,6 @@ pub(super) struct Items {
     pub shapes: Vec<Vec<Shape>>,
     /// Their sizes, straight.
     pub sizes: Vec<[u32; 2]>,
-    area: u64,
     /// Orders to lay them down in.
     pub orders: Vec<Vec<usize>>,
 }
@@ -55,21 +54,7 @@ impl Items {
             order.sort_by_cached_key(|&i| (Reverse(u64::from(masks[i].area()) * u64::from((1 << 15) + chance(i))), i));
             orders.push(order);
         }
-        let area = masks.iter().map(|m| u64::from(m.area())).sum();
-        Self { shapes, sizes: masks.iter().map(|m| [m.width, m.height]).collect(), area, orders }
-    }
-
-    /// Lays everything down in order `order`, so many texels between charts and around them all; the height, and the spots.
-    fn lay(&self, order: usize, [width, height]: [u32; 2], [gutter, rim]: [u32; 2]) -> Option<(u32, Vec<Spot>)> {
-        if self.area > u64::from(width) * u64::from(height) {
-            return None;
-        }
-        let mut strip = Strip::new(width, height, gutter, rim);
-        let mut spots = vec![Spot { x: 0, y: 0, turns: 0 }; self.shapes.len()];
-        for &i in &self.orders[order] {
-            spots[i] = strip.place(&self.shapes[i])?;
-        }
-        Some((strip.height, spots))
+        Self { shapes, sizes: masks.iter().map(|m| [m.width, m.height]).collect(), orders }
     }
 
     /// Steps that a search for an order is worth in an image of this size.
@@ -84,7 +69,8 @@ impl Items {
 
     /// The spots in an image of this size, in the first of so many orders in which everything fits.
     pub fn in_any_order(&self, orders: usize, size: [u32; 2], apart: [u32; 2]) -> Option<Vec<Spot>> {
-        (0..orders.min(self.orders.len())).into_par_iter().find_map_first(|order| self.lay(order, size, apart)).map(|(_, spots)| spots)
+        let search = self.search(size, apart);
+        self.orders.par_iter().take(orders).find_map_first(|order| search.all(order)).map(|laid| laid.spots)
     }
 
     /// The smallest image that one of the orders makes: its size, and the spots.
@@ -105,11 +91,11 @@ impl Items {
         let widths = (6..=side.ilog2()).rev().map(|log2| 1 << log2);
         let tries: Vec<(u32, usize)> = widths.flat_map(|width| orders.clone().map(move |order| (width, order))).collect();
         let of = |(i, &(width, order)): (usize, &(u32, usize))| {
-            let (height, spots) = self.lay(order, [width, most(width)], [gutter, 0])?;
-            let height = height.next_multiple_of(4);
+            let laid = self.search([width, most(width)], [gutter, 0]).all(&self.orders[order])?;
+            let height = laid.height.next_multiple_of(4);
             let taller = ROWS.into_iter().filter(|&rows| rows > height && rows <= most(width));
             let size = std::iter::once(height).chain(taller).map(|height| [width, height]).min_by_key(|&size| worth(size))?;
-            Some((worth(size), i, size, spots))
+            Some((worth(size), i, size, laid.spots))
         };
         let best = tries.par_iter().enumerate().filter_map(of).min_by_key(|&(worth, i, ..)| (worth, i));
         best.map(|(_, _, size, spots)| (size, spots))

@@ -26,13 +26,25 @@ pub(super) struct Laid {
     left: Vec<usize>,
     /// Their texels.
     lost: u32,
+    /// Rows of the image that are taken.
+    pub height: u32,
 }
 
 impl Search<'_> {
+    /// What comes of an order if everything fits in it.
+    pub fn all(&self, order: &[usize]) -> Option<Laid> {
+        if self.too_small() { None } else { self.lay(order.to_vec(), 0) }
+    }
+
+    /// The image has fewer texels than the masks.
+    fn too_small(&self) -> bool {
+        let area: u64 = self.shapes.iter().map(|turns| u64::from(turns[0].area)).sum();
+        area > u64::from(self.size[0]) * u64::from(self.size[1])
+    }
+
     /// What comes of the first of `orders` that everything fits in, or of one that comes about in so many steps from those that leave the least.
     pub fn found(&self, orders: &[Vec<usize>], steps: usize) -> Option<Laid> {
-        let area: u64 = self.shapes.iter().map(|turns| u64::from(turns[0].area)).sum();
-        if area > u64::from(self.size[0]) * u64::from(self.size[1]) {
+        if self.too_small() {
             return None;
         }
         let mut laid: Vec<Laid> = orders.par_iter().filter_map(|order| self.lay(order.clone(), u32::MAX)).collect();
@@ -92,7 +104,7 @@ impl Search<'_> {
                 return None;
             }
         }
-        Some(Laid { order, spots, left, lost })
+        Some(Laid { order, spots, left, lost, height: strip.height })
     }
 }
 

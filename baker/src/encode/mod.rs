@@ -352,7 +352,7 @@ impl Source for Wanted<'_> {
             }
             let mut best = (cost(nearest), nearest);
             let coarser = [nearest - nearest.signum(), nearest / 2, 0];
-            for value in coarser.into_iter().filter(|_| nearest != 0) {
+            for &value in if nearest == 0 { &[][..] } else { &coarser } {
                 let candidate = (cost(value), value);
                 if candidate.0 < best.0 {
                     best = candidate;
