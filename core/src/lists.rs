@@ -5,6 +5,7 @@
 use crate::coder::{Bits, Probability};
 use crate::format::MAX_SHEETS;
 use crate::grid::Grid;
+use core::ops::Range;
 use heapless::Vec;
 
 /// The sheets of one cell: labels, front to back, and the coverage test of each but the last. One label: a smooth cell.
@@ -86,6 +87,14 @@ impl<'m> Lists<'m> {
         Self { most: usize::from(sheets), ..self }
     }
 
+    /// Bytes that the lists of these `rows` of cells take, of those there are: the more, the more is torn there.
+    #[must_use]
+    pub fn held(&self, rows: Range<usize>) -> u32 {
+        let end = self.rows.len().saturating_sub(1);
+        let at = |row: usize| self.rows.get(row.min(end)).map_or(0, |&at| u32::from(at));
+        at(rows.end).saturating_sub(at(rows.start))
+    }
+
     /// A cursor at the first cell of `row`; past the last row one that sees no sheets.
     #[must_use]
     pub fn row(&self, row: usize) -> Cursor {
@@ -104,7 +113,7 @@ impl<'m> Lists<'m> {
 
     /// The label at `cursor`, where it is the only one.
     #[inline(always)]
-    fn single(&self, cursor: Cursor) -> Option<u8> {
+    pub fn single(&self, cursor: Cursor) -> Option<u8> {
         let &[head, label] = self.data.get(cursor.at..)?.first_chunk()?;
         (labels_of(head) == 1).then_some(label)
     }

@@ -127,8 +127,11 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, space: &mut Workspace<'
     }
     let stream = &mut space.stream;
     (stream.list_contexts, stream.key_contexts) = (cutter.take(lists::CONTEXTS), cutter.take(nodes::CONTEXTS));
-    stream.layout =
-        Layout { traces: cutter.take(row_layers.saturating_mul(2)), marks: cutter.take(row_layers), order: cutter.take(row_chains) };
+    stream.layout = Layout {
+        traces: cutter.take(row_layers.saturating_mul(2)),
+        open: cutter.take(bundle.label_count()),
+        place: cutter.take(row_chains),
+    };
     stream.views = cutter.take(bundle.planes().len());
     for key in stream.keys.iter_mut().take(slots) {
         *key = Key::new(

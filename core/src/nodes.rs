@@ -7,12 +7,12 @@
 
 use crate::coder::{Bits, Probability};
 use crate::field;
-use crate::format::{LabelRecord, MAX_NODE_LAYERS, MAX_SHEETS};
+use crate::format::LabelRecord;
 use crate::key::{BACKDROP, Chain, Key, NONE, Setting, Source};
 use crate::lists::{CHART, Cursor, Lists, SheetsRef};
 use crate::predict;
 pub use crate::predict::Trace;
-use heapless::Vec;
+use core::ops::Range;
 
 /// Contexts a key is coded with: for positions, then for fields.
 pub const CONTEXTS: usize = predict::CONTEXTS + field::CONTEXTS;
@@ -22,21 +22,10 @@ pub const CONTEXTS: usize = predict::CONTEXTS + field::CONTEXTS;
 pub struct Layout<'m> {
     /// Room for the layers of two rows of nodes, half of it each: what their coding leaves behind.
     pub traces: &'m mut [Trace],
-    /// Room for as many as a row has layers.
-    pub marks: &'m mut [Mark],
-    /// Room for one a chain of a row.
-    pub order: &'m mut [u16],
-}
-
-/// Layers of a chain that are alike, in the order in which they are found.
-#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C)]
-pub struct Mark {
-    /// The chain, counted as they begin.
-    chain: u16,
-    nodes: u16,
-    /// Some cell tests their fields: 1.
-    tested: u16,
+    /// Room for one a label: which of a row's chains is its last one.
+    pub open: &'m mut [u16],
+    /// Room for one a chain of a row: where its traces are.
+    pub place: &'m mut [u16],
 }
 
 /// Codes the layers of one `row` of a key's nodes into `target`, which holds those of the rows above, in `contexts` ([`CONTEXTS`] of
@@ -83,29 +72,26 @@ fn lay_out<L: Fn(u8) -> LabelRecord>(setting: &Setting<'_, '_, L>, target: &mut 
     }
     let first = target.row.get(row).map_or(0, |&at| usize::from(at));
     let [layers, fields] = target.used;
-    let half = layout.traces.len() / 2;
+    let Layout { traces, open, place } = layout;
+    let half = traces.len() / 2;
     let room = [target.uv.len().saturating_sub(layers), half];
     let free = target.chain.get_mut(first..).unwrap_or(&mut []);
-    let most = free.len().min(layout.order.len());
-    let chains = free.get_mut(..most).unwrap_or(&mut []);
+    let most = free.len().min(place.len());
     let backdrop = setting.backdrop();
-    let mut found = Finding { chains, count: 0, marks: &mut *layout.marks, marked: 0, room, backdrop };
-    found.walk(setting, row);
-    let Finding { count, marked, .. } = found;
+    open.fill(NONE);
+    let mut finding = Finding { chains: free.get_mut(..most).unwrap_or(&mut []), count: 0, open, room, backdrop, tested: false };
+    Cells::new(setting.lists, row).walk(setting.grid.columns, |cells, sheets| finding.take(cells, sheets));
+    let Finding { count, tested, .. } = finding;
     let Some(chains) = free.get_mut(..count) else { return };
-    // By label: then rows are gone through side by side. Where each stands, by the order in which they begin, is what marks want.
-    for (place, chain) in (0..).zip(&mut *chains) {
-        chain.at = place;
-    }
+    // By label: then rows are gone through side by side.
     sort(chains);
     let (mut layer, mut field, mut traced) = (layers, fields, 0usize);
     let behind = if backdrop { chains.partition_point(|chain| chain.label == BACKDROP) } else { 0 };
     let (behind, before) = chains.split_at_mut_checked(behind).unwrap_or_default();
-    for chain in before.iter_mut().chain(behind) {
+    let (behind_place, before_place) = place.split_at_mut_checked(behind.len()).unwrap_or_default();
+    for (chain, place) in before.iter_mut().zip(before_place).chain(behind.iter_mut().zip(behind_place)) {
         let nodes = usize::from(chain.nodes());
-        if let Some(place) = layout.order.get_mut(usize::from(chain.at)) {
-            *place = traced as u16;
-        }
+        *place = traced as u16;
         traced = traced.wrapping_add(nodes);
         chain.at = layers as u16;
         if !(backdrop && chain.label == BACKDROP) {
@@ -122,15 +108,44 @@ fn lay_out<L: Fn(u8) -> LabelRecord>(setting: &Setting<'_, '_, L>, target: &mut 
     if let Some(next) = target.row.get_mut(row.wrapping_add(1)) {
         *next = first.wrapping_add(count) as u16;
     }
-    let (even, odd) = layout.traces.split_at_mut(half);
+    let (even, odd) = traces.split_at_mut(half);
     let traces = if row & 1 == 0 { even } else { odd };
-    for mark in layout.marks.get(..marked).unwrap_or(&[]) {
-        let Some(place) = layout.order.get_mut(usize::from(mark.chain)) else { break };
-        let end = place.wrapping_add(mark.nodes);
-        for trace in traces.get_mut(usize::from(*place)..usize::from(end)).unwrap_or(&mut []) {
-            *trace = Trace::of(mark.tested != 0);
+    traces.iter_mut().take(traced).for_each(|trace| *trace = Trace::NONE);
+    if tested {
+        for (index, chain) in (0..count as u16).rev().zip(chains.iter().rev()) {
+            if let Some(open) = open.get_mut(usize::from(chain.label)) {
+                *open = index;
+            }
         }
-        *place = end;
+        Cells::new(setting.lists, row).walk(setting.grid.columns, |cells, sheets| mark(chains, open, place, traces, cells.start, sheets));
+    }
+}
+
+/// Marks the traces of the layers that a cell in `column` tests. Its `sheets` are in `chains`, which are sorted; of each label the one `open` is that
+/// of the cells to the left or before it, and `place` tells where each one's traces are.
+fn mark(chains: &[Chain], open: &mut [u16], place: &[u16], traces: &mut [Trace], column: u16, sheets: SheetsRef<'_>) {
+    if sheets.tests == 0 {
+        return;
+    }
+    for (index, &label) in sheets.labels.iter().enumerate() {
+        if sheets.test(index) == CHART {
+            continue;
+        }
+        let Some(open) = open.get_mut(usize::from(label)) else { continue };
+        while let Some(chain) = chains.get(usize::from(*open))
+            && chain.label == u16::from(label)
+        {
+            if column >= chain.end {
+                *open = open.wrapping_add(1);
+                continue;
+            }
+            // What there was no room for is in no chain.
+            if let Some((along, &place)) = column.checked_sub(chain.first).zip(place.get(usize::from(*open))) {
+                let first = usize::from(place.wrapping_add(along));
+                traces.iter_mut().skip(first).take(2).for_each(Trace::test);
+            }
+            break;
+        }
     }
 }
 
@@ -161,175 +176,107 @@ fn sort(chains: &mut [Chain]) {
 struct Finding<'f> {
     chains: &'f mut [Chain],
     count: usize,
-    marks: &'f mut [Mark],
-    marked: usize,
+    /// The last chain of each label.
+    open: &'f mut [u16],
     /// Positions and traces that there is room for.
     room: [usize; 2],
     /// The least label has traces alone.
     backdrop: bool,
-}
-
-impl Finding<'_> {
-    /// Goes through the nodes of `row`.
-    fn walk<L>(&mut self, setting: &Setting<'_, '_, L>, row: usize) {
-        let grid = setting.grid;
-        let mut around = Corner::new(setting.lists, row);
-        // The chains that the last node is part of, by label.
-        let mut open: Vec<u16, MAX_NODE_LAYERS> = Vec::new();
-        let mut column = 0usize;
-        while column < grid.node_columns() {
-            if let Some((label, alike)) = around.alike(grid.columns.saturating_sub(column)) {
-                let found = Found { label, tested: false };
-                let chain = self.put(&open, found, column as u16, alike);
-                open.clear();
-                if let Some(chain) = chain {
-                    let _ = open.push(chain);
-                }
-                column = column.wrapping_add(usize::from(alike));
-                continue;
-            }
-            let mut next: Vec<u16, MAX_NODE_LAYERS> = Vec::new();
-            around.labels(column < grid.columns, |found| {
-                if let Some(chain) = self.put(&open, found, column as u16, 1) {
-                    let _ = next.push(chain);
-                }
-            });
-            open = next;
-            column = column.wrapping_add(1);
-        }
-    }
-
-    /// Puts layers at `nodes` nodes from `column` on: into one of the chains that are `open`, or into a new one. Returns which.
-    fn put(&mut self, open: &[u16], found: Found, column: u16, nodes: u16) -> Option<u16> {
-        let [positions, traces] = self.room;
-        let wanted = if self.backdrop && found.label == 0 { 0 } else { usize::from(nodes) };
-        let left = [positions.checked_sub(wanted)?, traces.checked_sub(nodes.into())?];
-        let mark = self.marks.get_mut(self.marked)?;
-        let label = u16::from(found.label);
-        let known = open.iter().copied().find(|&chain| self.chains.get(usize::from(chain)).is_some_and(|chain| chain.label == label));
-        let index = known.unwrap_or(self.count as u16);
-        let chain = self.chains.get_mut(usize::from(index))?;
-        if known.is_none() {
-            *chain = Chain { first: column, end: column, at: 0, field: NONE, label };
-            self.count = self.count.wrapping_add(1);
-        }
-        chain.end = column.wrapping_add(nodes);
-        if found.tested {
-            chain.field = 0;
-        }
-        *mark = Mark { chain: index, nodes, tested: found.tested.into() };
-        (self.marked, self.room) = (self.marked.wrapping_add(1), left);
-        Some(index)
-    }
-}
-
-/// A label in the cells around a node.
-#[derive(Clone, Copy)]
-struct Found {
-    label: u8,
-    /// Some cell tests its fields.
+    /// Some cell tests some layer's fields.
     tested: bool,
 }
 
-/// The labels of the four cells on one side of a node, ascending.
-type Side = Vec<Found, { 4 * MAX_SHEETS }>;
-
-/// The cells around a node as a row of nodes is walked: above and below, in the interval before and after.
-struct Corner<'l, 'm> {
-    /// The cells to the left of the node, and those to the right with their lists.
-    left: [SheetsRef<'l>; 4],
-    right: [Option<(&'l Lists<'m>, Cursor)>; 4],
-    /// What those to the left show.
-    seen: Side,
+impl Finding<'_> {
+    /// Takes in the `sheets` that each of these `cells` lists: their labels have layers at all nodes around. What there is no room for is left out.
+    #[inline(always)]
+    fn take(&mut self, cells: Range<u16>, sheets: SheetsRef<'_>) {
+        let end = cells.end.wrapping_add(1);
+        for (index, &label) in sheets.labels.iter().enumerate() {
+            let Some(open) = self.open.get_mut(usize::from(label)) else { continue };
+            let tested = sheets.tests != 0 && sheets.test(index) != CHART;
+            let positions = !(self.backdrop && label == 0);
+            let known = self.chains.get_mut(usize::from(*open)).filter(|chain| chain.end >= cells.start);
+            let chain = if let Some(chain) = known {
+                // Most cells list what others around them do.
+                if chain.end < end {
+                    let Some(left) = less(self.room, end.wrapping_sub(chain.end), positions) else { continue };
+                    (self.room, chain.end) = (left, end);
+                }
+                chain
+            } else {
+                let left = less(self.room, end.wrapping_sub(cells.start), positions);
+                let Some((left, chain)) = left.zip(self.chains.get_mut(self.count)) else { continue };
+                *chain = Chain { first: cells.start, end, at: 0, field: NONE, label: label.into() };
+                (self.room, *open) = (left, self.count as u16);
+                self.count = self.count.wrapping_add(1);
+                chain
+            };
+            if tested {
+                chain.field = 0;
+                self.tested = true;
+            }
+        }
+    }
 }
 
-impl<'l, 'm> Corner<'l, 'm> {
+/// What `room` for positions and traces is left beside so many `nodes`, which may have no positions.
+#[inline(always)]
+fn less([positions, traces]: [usize; 2], nodes: u16, with_positions: bool) -> Option<[usize; 2]> {
+    let nodes = usize::from(nodes);
+    Some([positions.checked_sub(if with_positions { nodes } else { 0 })?, traces.checked_sub(nodes)?])
+}
+
+/// The cells above and below a row of nodes, in the interval before and after, as it is walked from left to right.
+struct Cells<'l, 'm>([Option<(&'l Lists<'m>, Cursor)>; 4]);
+
+impl<'l, 'm> Cells<'l, 'm> {
     fn new([before, after]: [Option<&'l Lists<'m>>; 2], row: usize) -> Self {
         let at = |list: Option<&'l Lists<'m>>, row: Option<usize>| list.zip(row).map(|(list, row)| (list, list.row(row)));
         let above = row.checked_sub(1);
-        let right = [at(before, above), at(before, Some(row)), at(after, above), at(after, Some(row))];
-        Self { left: [SheetsRef::default(); 4], right, seen: Side::new() }
+        Self([at(before, above), at(before, Some(row)), at(after, above), at(after, Some(row))])
     }
 
-    /// Passes the labels of the cells around the node on, ascending, as many as a node may have; then moves on.
-    fn labels(&mut self, inside: bool, mut pass: impl FnMut(Found)) {
-        let mut ahead = Side::new();
-        for (left, right) in self.left.iter_mut().zip(&mut self.right) {
-            let mut sheets = SheetsRef::default();
-            if let Some((list, cursor)) = right.as_mut().filter(|_| inside) {
-                sheets = list.sheets(*cursor);
-                *cursor = cursor.next(list);
+    /// Goes over so many `columns`; `pass` hears of every list that is there, and of which columns. Where all lists name one label and no other, it hears
+    /// of one of them.
+    #[inline(always)]
+    fn walk(mut self, columns: usize, mut pass: impl FnMut(Range<u16>, SheetsRef<'_>)) {
+        // Below the grid, and past a broken list's end, there are none.
+        for cell in &mut self.0 {
+            *cell = cell.filter(|(lists, cursor)| !lists.sheets(*cursor).labels.is_empty());
+        }
+        let mut column = 0usize;
+        while column < columns {
+            let first = column as u16;
+            if let Some((label, alike)) = self.alike(columns.wrapping_sub(column)) {
+                column = column.wrapping_add(alike);
+                pass(first..column as u16, SheetsRef { labels: &[label], tests: 0 });
+                continue;
             }
-            collect(sheets, &mut ahead);
-            *left = sheets;
+            column = column.wrapping_add(1);
+            for (lists, cursor) in self.0.iter_mut().flatten() {
+                pass(first..column as u16, lists.sheets(*cursor));
+                *cursor = cursor.next(lists);
+            }
         }
-        let (mut left, mut right) = (self.seen.iter().copied().peekable(), ahead.iter().copied().peekable());
-        for _ in 0..MAX_NODE_LAYERS {
-            let found = match (left.peek(), right.peek()) {
-                (Some(a), Some(b)) if a.label == b.label => {
-                    let tested = a.tested | b.tested;
-                    right.next();
-                    left.next().map(|found| Found { tested, ..found })
-                }
-                (Some(a), Some(b)) if a.label > b.label => right.next(),
-                (Some(_), _) => left.next(),
-                (None, _) => right.next(),
-            };
-            let Some(found) = found else { break };
-            pass(found);
-        }
-        self.seen = ahead;
     }
 
-    /// The one label that all cells around each of the next nodes show, and how many nodes these are, `most` at most; moves past them. `None` where the
-    /// next one has others.
-    fn alike(&mut self, most: usize) -> Option<(u8, u16)> {
-        let &[label] = self.left.iter().find_map(|left| left.labels.first_chunk())?;
-        let (mut alike, mut any) = (most, false);
-        for (left, right) in self.left.iter().zip(&self.right) {
-            let Some((list, cursor)) = right.filter(|(list, cursor)| !list.sheets(*cursor).labels.is_empty()) else {
-                // Beyond the grid's edge, as to the left of it.
-                if left.labels.is_empty() {
-                    continue;
-                }
-                return None;
-            };
-            if left.labels != [label] {
-                return None;
-            }
-            (alike, _) = list.alike(cursor, label, alike);
-            any = true;
+    /// The one label that all cells in each of the next columns list, and how many these are, `most` at most; moves past them. `None` where those in the
+    /// next one list others.
+    #[inline(always)]
+    fn alike(&mut self, most: usize) -> Option<(u8, usize)> {
+        let &(first, cursor) = self.0.iter().flatten().next()?;
+        let label = first.single(cursor)?;
+        let mut alike = most;
+        for &(lists, cursor) in self.0.iter().flatten() {
+            (alike, _) = lists.alike(cursor, label, alike);
         }
-        if alike == 0 || !any {
+        if alike == 0 {
             return None;
         }
-        for right in self.right.iter_mut().flatten() {
-            (_, right.1) = right.0.alike(right.1, label, alike);
+        for (lists, cursor) in self.0.iter_mut().flatten() {
+            (_, *cursor) = lists.alike(*cursor, label, alike);
         }
-        Some((label, alike as u16))
-    }
-}
-
-/// Adds what a cell's `sheets` say about its nodes.
-fn collect(sheets: SheetsRef<'_>, found: &mut Side) {
-    for (index, &label) in sheets.labels.iter().enumerate() {
-        let tested = sheets.test(index) != CHART;
-        // A few at most: a walk finds the place as fast as any search.
-        let at = found.iter().take_while(|other| other.label < label).count();
-        let full = found.is_full();
-        match found.get_mut(at) {
-            Some(other) if other.label == label => other.tested |= tested,
-            // There is room for all that four cells can have.
-            _ if full => {}
-            _ => {
-                // Each makes room for the one before it.
-                let mut moved = Found { label, tested };
-                for slot in found.iter_mut().skip(at) {
-                    core::mem::swap(slot, &mut moved);
-                }
-                let _ = found.push(moved);
-            }
-        }
+        Some((label, alike))
     }
 }
 

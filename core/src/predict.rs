@@ -178,11 +178,12 @@ const fn marks_of(base: Base) -> u32 {
 }
 
 impl Trace {
-    const NONE: Self = Self { word: 0, offset: [0; 2] };
+    /// That of a layer that is not coded yet.
+    pub(crate) const NONE: Self = Self { word: 0, offset: [0; 2] };
 
-    /// The trace of a layer that is not coded yet; some cell `tested` its fields.
-    pub(crate) fn of(tested: bool) -> Self {
-        Self { word: if tested { TESTED } else { 0 }, ..Self::NONE }
+    /// Some cell tests the layer's fields: says so.
+    pub(crate) const fn test(&mut self) {
+        self.word |= TESTED;
     }
 
     /// Some cell tests the layer's fields.

@@ -9,6 +9,7 @@ use crate::key::{BACKDROP, Key, Setting, Source};
 use crate::lists::{self, Lists};
 use crate::nodes::{self, Layout};
 use crate::plane::{Camera, PLANE_BYTES, Plane, View};
+use core::ops::Range;
 
 /// Keys held at a time, at most: four to play a cubic interval, and the one that is being coded.
 pub const MAX_KEYS: usize = 5;
@@ -72,10 +73,10 @@ pub struct Place {
 
 /// Rows of cells whose lists make a slice: about as much work as one row of nodes.
 const LIST_ROWS: usize = 4;
-/// What a byte, a layer of a row of nodes and a slice of lists cost to code, in parts of equal time: fitted to counted instructions, and then to the
-/// worst frames' (a row of many layers is half a frame's share where keys are close: no estimate evens that out).
+/// What a byte, a layer of a row of nodes and a slice of lists cost to code, in parts of equal time, a part being what a byte of the lists of the cells
+/// around costs beside: fitted to counted instructions, of which that misses a twentieth.
 pub const BYTE_COST: u32 = 4;
-const LAYER_COST: u32 = 3;
+const LAYER_COST: u32 = 4;
 const LIST_COST: u32 = 200;
 
 impl Place {
@@ -171,16 +172,21 @@ impl<'m> Stream<'m> {
     }
 
     /// What slice `slice` of the record at `place`, which follows the newest, costs to code beside its bytes: its row of nodes has about as many layers
-    /// as the newest record's. `backdrop`: the least label has no positions.
+    /// as the newest record's, and the cells around as many sheets. `backdrop`: the least label has no positions.
     #[must_use]
     pub fn cost(&self, grid: Grid, place: Place, slice: usize, backdrop: bool) -> u32 {
         let [after, before] = place.list_slices(grid);
-        let Some(row) = slice.checked_sub(after.wrapping_add(before)) else { return LIST_COST };
+        let around = |rows: Range<usize>| self.lists.get(self.list_slot(self.turn)).map_or(0, |lists| lists.held(rows));
+        let Some(row) = slice.checked_sub(after.wrapping_add(before)) else {
+            let first = slice.checked_sub(after).unwrap_or(slice).wrapping_mul(LIST_ROWS);
+            return around(first..first.wrapping_add(LIST_ROWS)).wrapping_add(LIST_COST);
+        };
         let known = self.key(0).filter(|_| !place.independent).map_or(&[][..], |key| key.chains(row));
         let chains = known.iter().filter(|chain| !(backdrop && chain.label == BACKDROP));
         let layers = chains.map(|chain| u32::from(chain.nodes())).fold(0, u32::wrapping_add);
         let layers = if known.is_empty() { grid.columns as u32 } else { layers };
-        layers.wrapping_mul(LAYER_COST).wrapping_add(1)
+        let around = around(row.saturating_sub(1)..row.wrapping_add(1));
+        layers.wrapping_mul(LAYER_COST).wrapping_add(around).wrapping_add(1)
     }
 
     /// The record that was coded slice by slice is the newest from now on.

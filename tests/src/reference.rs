@@ -10,7 +10,7 @@ use cubist_core::format::{LabelRecord, MASKED, SPACE_CUBIC, STRIP, TIME_CUBIC, T
 use cubist_core::grid::Grid;
 use cubist_core::key::{self, Chain, Key, Nothing};
 use cubist_core::lists::{self, CHART, FIELD, Lists};
-use cubist_core::nodes::{self, Layout, Mark, Trace};
+use cubist_core::nodes::{self, Layout, Trace};
 use cubist_core::plane::View;
 use cubist_core::record::{LISTS, MAX_KEYS, Shape, Stream};
 use cubist_core::timeline;
@@ -118,8 +118,8 @@ impl<'a> Reference<'a> {
         let layers = usize::from(limits.key_layers);
         let mut contexts = [vec![Probability::NEW; lists::CONTEXTS], vec![Probability::NEW; nodes::CONTEXTS]];
         let mut traces = vec![Trace::default(); 2 * usize::from(limits.row_layers)];
-        let mut marks = vec![Mark::default(); usize::from(limits.row_layers)];
-        let mut order = vec![0; usize::from(limits.row_chains)];
+        let mut open = vec![0; bundle.label_count()];
+        let mut place = vec![0; usize::from(limits.row_chains)];
         let mut views = vec![View::default(); bundle.planes().len()];
         let mut key_memory: [_; MAX_KEYS] = std::array::from_fn(|_| {
             let chains = vec![Chain::default(); usize::from(limits.key_chains)];
@@ -130,7 +130,7 @@ impl<'a> Reference<'a> {
         let mut stream = Stream {
             list_contexts,
             key_contexts,
-            layout: Layout { traces: &mut traces, marks: &mut marks, order: &mut order },
+            layout: Layout { traces: &mut traces, open: &mut open, place: &mut place },
             views: &mut views,
             keys: key_memory.each_mut().map(|(rows, chains, uv, [a, b])| Key::new(rows, chains, uv, [a, b])),
             lists: list_memory.each_mut().map(|(rows, data)| Lists::new(rows, data)),

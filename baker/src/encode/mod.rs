@@ -17,7 +17,7 @@ use cubist_core::format::{
 };
 use cubist_core::key::{Base, Chain, Key, Source};
 use cubist_core::lists::{self, Lists};
-use cubist_core::nodes::{self, Layout, Mark, Trace};
+use cubist_core::nodes::{self, Layout, Trace};
 use cubist_core::plane::{CAMERA_BYTES, Camera, PLANE_BYTES, Plane, View};
 use cubist_core::record::{LISTS, MAX_KEYS, Place, Shape, Stream};
 pub use limits::Exceeded;
@@ -207,7 +207,7 @@ fn keys(
     bounds: &mut Limits,
 ) -> (Vec<u8>, Vec<u8>) {
     let grid = content.grid;
-    let mut memory = Memory::new(grid, *bounds, planes.len());
+    let mut memory = Memory::new(grid, *bounds, [labels.len(), planes.len()]);
     (bounds.key_layers, bounds.key_chains, bounds.row_chains, bounds.key_fields) = (0, 0, 0, 0);
     let mut stream = memory.stream();
     let shape = Shape {
@@ -253,21 +253,21 @@ type OneKey = (Vec<u16>, Vec<Chain>, Vec<u32>, [Vec<i8>; 2]);
 struct Memory {
     contexts: [Vec<Probability>; 2],
     traces: Vec<Trace>,
-    marks: Vec<Mark>,
-    order: Vec<u16>,
+    open: Vec<u16>,
+    place: Vec<u16>,
     views: Vec<View>,
     keys: [OneKey; MAX_KEYS],
     lists: [(Vec<u16>, Vec<u8>); LISTS],
 }
 
 impl Memory {
-    fn new(grid: &KeyGrid, limits: Limits, planes: usize) -> Self {
+    fn new(grid: &KeyGrid, limits: Limits, [labels, planes]: [usize; 2]) -> Self {
         let layers = usize::from(limits.key_layers);
         Self {
             contexts: [vec![Probability::NEW; lists::CONTEXTS], vec![Probability::NEW; nodes::CONTEXTS]],
             traces: vec![Trace::default(); 2 * usize::from(limits.row_layers)],
-            marks: vec![Mark::default(); usize::from(limits.row_layers)],
-            order: vec![0; usize::from(limits.row_chains)],
+            open: vec![0; labels],
+            place: vec![0; usize::from(limits.row_chains)],
             views: vec![View::default(); planes],
             keys: std::array::from_fn(|_| {
                 let chains = vec![Chain::default(); usize::from(limits.key_chains)];
@@ -282,7 +282,7 @@ impl Memory {
         Stream {
             list_contexts,
             key_contexts,
-            layout: Layout { traces: &mut self.traces, marks: &mut self.marks, order: &mut self.order },
+            layout: Layout { traces: &mut self.traces, open: &mut self.open, place: &mut self.place },
             views: &mut self.views,
             keys: self.keys.each_mut().map(|(rows, chains, uv, [a, b])| Key::new(rows, chains, uv, [a, b])),
             lists: self.lists.each_mut().map(|(rows, data)| Lists::new(rows, data)),
