@@ -282,7 +282,130 @@ impl<'l, 'm> Cells<'l, 'm> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Chain, sort};
+    extern crate std;
+
+    use super::{Chain, Layout, Trace, lay_out, sort};
+    use crate::coder::{Bits, Probability};
+    use crate::format::{LabelRecord, MAX_SHEETS};
+    use crate::grid::Grid;
+    use crate::key::{Key, NONE, Setting};
+    use crate::lists::{self, CHART, FIELD, Lists, Sheets};
+    use std::vec;
+    use std::vec::Vec;
+
+    /// Bits that come out as they go in.
+    struct Said;
+
+    impl Bits for Said {
+        fn bit(&mut self, _: &mut Probability, bit: bool) -> bool {
+            bit
+        }
+
+        fn flat(&mut self, _: u32, value: u32) -> u32 {
+            value
+        }
+    }
+
+    /// A number below `end`, by chance.
+    fn chance(seed: &mut u32, end: u32) -> u32 {
+        *seed = seed.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (u64::from(*seed).wrapping_mul(u64::from(end)) >> 32) as u32
+    }
+
+    #[test]
+    fn nodes_carry_what_the_cells_around_list() {
+        const LABELS: usize = 6;
+        let (grid, mut seed) = (Grid::new(80, 48, 3), 11u32);
+        let cells = grid.columns * grid.rows;
+        for round in 0..200 {
+            // Patches of one label, and here and there cells of several, of which some are tested by a field.
+            let mut wanted = [const { Vec::new() }; 2];
+            for list in &mut wanted {
+                let base = chance(&mut seed, 3);
+                *list = (0..cells)
+                    .map(|cell| {
+                        let torn = chance(&mut seed, 4) == 0;
+                        let mut sheets = Sheets::default();
+                        for _ in 0..if torn { 2 + chance(&mut seed, 2) } else { 1 } {
+                            let label =
+                                if torn { chance(&mut seed, LABELS as u32) } else { base + u32::from(cell % grid.columns > 5) } as u8;
+                            if !sheets.labels.contains(&label) && sheets.labels.push(label).is_err() {
+                                break;
+                            }
+                        }
+                        let fields = sheets.labels.len() > 1 && chance(&mut seed, 2) == 0;
+                        sheets.tests = if fields { FIELD } else { CHART };
+                        sheets
+                    })
+                    .collect::<Vec<Sheets>>();
+            }
+            let mut memory = [const { (Vec::new(), Vec::new()) }; 2];
+            let both = memory.each_mut().map(|(rows, data)| {
+                (*rows, *data) = (vec![0u16; grid.rows + 1], vec![0u8; cells * (MAX_SHEETS + 3)]);
+                Lists::new(rows, data)
+            });
+            let mut contexts = [Probability::NEW; lists::CONTEXTS];
+            let mut both = both;
+            for (list, wanted) in both.iter_mut().zip(&wanted) {
+                for row in 0..grid.rows {
+                    lists::code_row(&mut Said, &mut contexts, grid, LABELS, None, list, row, &mut |cell| {
+                        wanted.get(cell).cloned().unwrap_or_default()
+                    });
+                }
+            }
+            // What the cells around a node list, in both intervals.
+            let around = |column: usize, row: usize| {
+                let cells = [(0, 0), (1, 0), (0, 1), (1, 1)].into_iter().filter_map(move |(x, y)| {
+                    let (x, y) = (column.checked_add(x)?.checked_sub(1)?, row.checked_add(y)?.checked_sub(1)?);
+                    (x < grid.columns && y < grid.rows).then_some(y * grid.columns + x)
+                });
+                cells.flat_map(|cell| wanted.iter().filter_map(move |list| list.get(cell)))
+            };
+            let backdrop = round % 2 == 1;
+            let label =
+                |label: u8| LabelRecord { flags: if backdrop && label == 0 { crate::format::FIXED } else { 0 }, ..LabelRecord::default() };
+            let [before, after] = &both;
+            let setting = Setting {
+                grid,
+                label,
+                key_bits: 6,
+                step_log2: 0,
+                before: None,
+                before_that: None,
+                lists: [Some(before), Some(after)],
+                planes: &[],
+                views: &[],
+            };
+            let most = grid.node_columns() * LABELS;
+            let (mut rows, mut chains) = (vec![0u16; grid.node_rows() + 1], vec![Chain::default(); most * grid.node_rows()]);
+            let (mut uv, mut codes) = (vec![0u32; most * grid.node_rows()], [(); 2].map(|()| vec![0i8; most * grid.node_rows()]));
+            let mut key = Key::new(&mut rows, &mut chains, &mut uv, codes.each_mut().map(Vec::as_mut_slice));
+            let (mut traces, mut open, mut place) = (vec![Trace::default(); 2 * most], vec![0u16; LABELS], vec![0u16; most]);
+            for row in 0..grid.node_rows() {
+                let mut layout = Layout { traces: &mut traces, open: &mut open, place: &mut place };
+                lay_out(&setting, &mut key, &mut layout, row);
+                let mut carried = 0;
+                for (index, chain) in key.chains(row).iter().enumerate() {
+                    let at = usize::from(place.get(index).copied().unwrap_or(NONE)) + if row % 2 == 0 { 0 } else { most };
+                    carried += usize::from(chain.nodes());
+                    for (along, column) in (chain.first..chain.end).enumerate() {
+                        let (mut listed, mut tested) = (false, false);
+                        for sheets in around(column.into(), row) {
+                            let known = sheets.labels.iter().position(|&label| u16::from(label) == chain.label);
+                            listed |= known.is_some();
+                            tested |= known == Some(0) && sheets.tests == FIELD;
+                        }
+                        assert!(listed, "round {round}: {chain:?} at {column}, {row}");
+                        assert_eq!(traces.get(at + along).map(Trace::tested), Some(tested), "round {round}: {chain:?} at {column}, {row}");
+                        assert!(!tested || chain.field != NONE, "round {round}: {chain:?} at {column}, {row}");
+                    }
+                }
+                let carries = |column: usize, label: u8| around(column, row).any(|sheets| sheets.labels.contains(&label));
+                let all = (0..grid.node_columns()).flat_map(|column| (0..LABELS as u8).map(move |label| (column, label)));
+                assert_eq!(carried, all.filter(|&(column, label)| carries(column, label)).count(), "round {round}, row {row}: each once");
+            }
+        }
+    }
 
     #[test]
     fn chains_are_sorted_by_label_and_from_left_to_right() {
