@@ -7,8 +7,8 @@ use cubist_core::grid::Grid;
 use cubist_core::{Bundle, Frame, Player, Work};
 use cubist_tests::{play, scenes};
 
-/// About what a slice costs beside the bytes that it reads, in bytes of equal time.
-const SLICE_COST: u32 = 24;
+/// About what a slice costs beside the bytes that it reads, in bytes of equal time: 600 to 700 counted instructions each.
+const SLICE_COST: u32 = 48;
 
 /// The bundle of a scene whose every third key is independent.
 fn bake(name: &str, size: [u32; 2], frames: u32, looping: bool, time: u8, key_interval: u32) -> Vec<u8> {
