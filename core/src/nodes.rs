@@ -285,26 +285,14 @@ mod tests {
     extern crate std;
 
     use super::{Chain, Layout, Trace, lay_out, sort};
-    use crate::coder::{Bits, Probability};
+    use crate::coder::Probability;
     use crate::format::{LabelRecord, MAX_SHEETS};
     use crate::grid::Grid;
     use crate::key::{Key, NONE, Setting};
     use crate::lists::{self, CHART, FIELD, Lists, Sheets};
+    use crate::predict::Trial;
     use std::vec;
     use std::vec::Vec;
-
-    /// Bits that come out as they go in.
-    struct Said;
-
-    impl Bits for Said {
-        fn bit(&mut self, _: &mut Probability, bit: bool) -> bool {
-            bit
-        }
-
-        fn flat(&mut self, _: u32, value: u32) -> u32 {
-            value
-        }
-    }
 
     /// A number below `end`, by chance.
     fn chance(seed: &mut u32, end: u32) -> u32 {
@@ -348,7 +336,7 @@ mod tests {
             let mut both = both;
             for (list, wanted) in both.iter_mut().zip(&wanted) {
                 for row in 0..grid.rows {
-                    lists::code_row(&mut Said, &mut contexts, grid, LABELS, None, list, row, &mut |cell| {
+                    lists::code_row(&mut Trial, &mut contexts, grid, LABELS, None, list, row, &mut |cell| {
                         wanted.get(cell).cloned().unwrap_or_default()
                     });
                 }

@@ -43,8 +43,8 @@ pub fn code<B: Bits, S: Source, L: Fn(u8) -> LabelRecord>(
     walk(bits, residuals, setting, key, traces, (row, base), chain, source);
 }
 
-/// The bits of a trial go nowhere, and teach nothing.
-struct Trial;
+/// The bits of a trial go nowhere, and teach nothing: they are what an encoder says.
+pub(crate) struct Trial;
 
 impl Bits for Trial {
     fn bit(&mut self, _: &mut Probability, bit: bool) -> bool {
