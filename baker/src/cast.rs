@@ -13,7 +13,7 @@ pub struct Cast<'a> {
     pub(crate) tracer: Tracer<'a>,
     pub(crate) hits: Hits,
     pub(crate) gaps: Gaps,
-    /// Seconds it took.
+    /// Seconds it took, with the tracer if that was made for it.
     pub(crate) seconds: f64,
 }
 
@@ -21,12 +21,17 @@ impl<'a> Cast<'a> {
     /// Casts the rays of all frames; `progress` hears what is done, and how much of it, 0..=1.
     #[must_use]
     pub fn new(scene: &'a Scene, progress: &(dyn Fn(&str, f64) + Sync)) -> Self {
-        let start = Instant::now();
         progress("building the hierarchy", 0.0);
-        let tracer = Tracer::new(scene);
+        Self::by(scene, Tracer::new(scene), progress)
+    }
+
+    /// Likewise, by a tracer of the scene.
+    #[must_use]
+    pub fn by(scene: &'a Scene, tracer: Tracer<'a>, progress: &(dyn Fn(&str, f64) + Sync)) -> Self {
+        let (start, building) = (Instant::now(), tracer.seconds);
         let hits = Hits::cast(scene, &tracer, &|done, total| progress("casting rays", done as f64 / total.max(1) as f64));
         let gaps = Gaps::new(&hits);
-        Self { scene, tracer, hits, gaps, seconds: start.elapsed().as_secs_f64() }
+        Self { scene, tracer, hits, gaps, seconds: building + start.elapsed().as_secs_f64() }
     }
 }
 

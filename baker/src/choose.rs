@@ -7,6 +7,7 @@ use crate::cast::Cast;
 use crate::chart::{self, Charting, Choice, Family, Trial};
 use crate::job::something_seen;
 use crate::scene::Scene;
+use crate::trace::Tracer;
 use crate::truth::{Truth, spread};
 use crate::verify;
 use rayon::prelude::*;
@@ -25,12 +26,13 @@ const GAIN: f64 = 0.1;
 /// The picture of half the size, in parts of the whole one: a little over a quarter, since outlines shrink less than areas.
 const PICTURE: f64 = 1.0 / 3.5;
 
-/// Tries the families on `scene`: those that can flatten it, the scene's own among them if it brings one or has a texture that does. Then the best of
+/// Tries the families on `scene`, whose rays `tracer` casts: those that can flatten it, the scene's own among them if it brings one or has a texture that does. Then the best of
 /// them with texels moved inside charts, unless `rewarp` says whether they are.
 ///
 /// # Errors
 /// [`BakeError`] where no family can bake the scene.
-pub fn charts(scene: &Scene, settings: &Settings, rewarp: Option<bool>, progress: Progress<'_>) -> Result<Choice, BakeError> {
+pub fn charts(tracer: &Tracer<'_>, settings: &Settings, rewarp: Option<bool>, progress: Progress<'_>) -> Result<Choice, BakeError> {
+    let scene = tracer.scene();
     let families: &[Family] = if chart::brings_own(scene) {
         &[Family::Own, Family::Planes, Family::Sight]
     } else if chart::Islands::new(scene).is_ok_and(|islands| islands.count <= MOST) {
@@ -39,9 +41,9 @@ pub fn charts(scene: &Scene, settings: &Settings, rewarp: Option<bool>, progress
         &[Family::Planes, Family::Sight]
     };
     let (small, settings) = halved(scene, settings);
-    let cast = Cast::new(&small, &|_, _| {});
+    let cast = Cast::by(&small, tracer.of(&small), &|_, _| {});
     let hits = &cast.hits;
-    let truth = Truth::new(&small);
+    let truth = Truth::by(&small, tracer.of(&small));
     let pictures: Vec<(u32, Vec<u8>)> = spread(small.playback.frames, COMPARED).into_iter().map(|f| (f, truth.frame(f))).collect();
     let settings_of = |family: Family, rewarped: bool| {
         let charts = Choice { rewarped, ..family.into() };
@@ -118,7 +120,7 @@ mod tests {
     fn every_family_is_tried_on_a_scene_with_islands() {
         let mut scene = builtin::build("pyramid").expect("there is one");
         (scene.playback.width, scene.playback.height, scene.playback.frames) = (96, 64, 9);
-        let choice = charts(&scene, &Settings::default(), Some(false), &|_, _| {}).expect("it bakes");
+        let choice = charts(&Tracer::new(&scene), &Settings::default(), Some(false), &|_, _| {}).expect("it bakes");
         let tried: Vec<Family> = choice.tried().map(|t| t.family).collect();
         assert_eq!(tried, [Family::Own, Family::Planes, Family::Sight]);
         assert!(choice.tried().all(|t| t.bytes > 100 && t.psnr > 20.0), "{choice:?}");

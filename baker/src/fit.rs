@@ -292,7 +292,7 @@ fn runs(elements: &[Element]) -> Vec<Run<'_>> {
 /// y = A x: runs of elements side by side, each in a fixed order, added up in a fixed order: the same sums on any number of threads.
 fn multiply(runs: &[Run<'_>], weights: &[Vec<Weights>], x: &[[f64; 2]], y: &mut [[f64; 2]]) {
     let product = |run: &Run<'_>| {
-        let mut y = vec![[0.0; 2]; x.len()];
+        let mut y = vec![[0.0; 2]; run.layers.end];
         run.elements.iter().for_each(|element| element.multiply(&weights[element.interval as usize], x, &mut y));
         y
     };

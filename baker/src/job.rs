@@ -15,6 +15,7 @@ use crate::repaint::Painter;
 use crate::report::{Origin, Report, Seconds};
 use crate::scene::Scene;
 use crate::straight;
+use crate::trace::Tracer;
 use crate::truth::{Truth, spread};
 use crate::{tune, verify};
 use std::time::Instant;
@@ -200,13 +201,19 @@ pub fn bake_scene(scene: &Scene, options: &Options, progress: Progress<'_>) -> R
 /// # Errors
 /// The same.
 pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<Baked, BakeError> {
-    let start = Instant::now();
-    let choice = choice(scene, options, progress)?;
+    progress("building the hierarchy", 0.0);
+    by(&Tracer::new(scene), options, progress)
+}
+
+/// Like [`run`], of a scene whose rays `tracer` casts.
+fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<Baked, BakeError> {
+    let (start, scene) = (Instant::now(), tracer.scene());
+    let choice = choice(tracer, options, progress)?;
     let options = &Options { charts: Some(choice), ..*options };
     // What needs no more memory than there is stays as it is; where it cannot be had at all, the search says why.
     let mut whole = None;
     if let Goal::Ram(room) = options.goal
-        && let Ok(baked) = run(scene, &Options { goal: Goal::AsSet, ..*options }, progress)
+        && let Ok(baked) = by(tracer, &Options { goal: Goal::AsSet, ..*options }, progress)
     {
         let memory = baked.report.memory.workspace;
         if memory <= room {
@@ -220,7 +227,7 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
     let options = &Options { source: atlas::Settings { outline, ..options.source }, ..*options };
     let choice_seconds = start.elapsed().as_secs_f64();
     let settings = options.settings(scene.playback.width);
-    let cast = Cast::new(scene, progress);
+    let cast = Cast::by(scene, tracer.of(scene), progress);
     let paint_start = Instant::now();
     let painter = (!options.plain).then(|| Painter::new(&cast, progress));
     let paint_seconds = paint_start.elapsed().as_secs_f64();
@@ -269,13 +276,13 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
     } else {
         progress("comparing with the truth", 0.0);
         let bar = |d, n| progress("comparing with the truth", part(d, n));
-        Some(verify::against_truth(&encoded.bundle, &Truth::new(scene), &frames, &bar)?)
+        Some(verify::against_truth(&encoded.bundle, &Truth::by(scene, tracer.of(scene)), &frames, &bar)?)
     };
     let seconds = Seconds {
-        total: options.load_seconds + start.elapsed().as_secs_f64(),
+        total: options.load_seconds + tracer.seconds + start.elapsed().as_secs_f64(),
         load: options.load_seconds,
         atlas: flat.atlas_seconds,
-        rays: flat.ray_seconds,
+        rays: tracer.seconds + flat.ray_seconds,
         encode: encoded.seconds,
         paint: paint_seconds,
         verify: verify_start.elapsed().as_secs_f64(),
@@ -288,7 +295,8 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
 }
 
 /// How to cut the surface: as asked for, as the scene brings it, or as trials show.
-fn choice(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<Choice, BakeError> {
+fn choice(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<Choice, BakeError> {
+    let scene = tracer.scene();
     let rewarped = options.rewarp.unwrap_or(false);
     match options.charts {
         Some(choice) => {
@@ -298,7 +306,7 @@ fn choice(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<Ch
             Ok(Choice { rewarped: options.rewarp.unwrap_or(choice.rewarped), ..choice })
         }
         None if chart::brings_own(scene) => Ok(Choice { rewarped, ..Family::Own.into() }),
-        None => choose::charts(scene, &options.settings(scene.playback.width), options.rewarp, progress),
+        None => choose::charts(tracer, &options.settings(scene.playback.width), options.rewarp, progress),
     }
 }
 

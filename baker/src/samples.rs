@@ -3,8 +3,8 @@
 
 use crate::atlas::Atlas;
 use crate::bake::BakeError;
+use crate::cast::Cast;
 use crate::metrics;
-use crate::scene::Scene;
 use crate::truth::Truth;
 use crate::verify;
 
@@ -19,8 +19,9 @@ pub(crate) struct Samples {
 
 impl Samples {
     /// Renders them.
-    pub(crate) fn new(scene: &Scene) -> Self {
-        let truth = Truth::new(scene);
+    pub(crate) fn new(cast: &Cast<'_>) -> Self {
+        let scene = cast.scene;
+        let truth = Truth::by(scene, cast.tracer.of(scene));
         let frames = scattered(scene.playback.frames);
         let pictures = frames.iter().map(|&frame| truth.frame(frame)).collect();
         Self { frames, pictures }

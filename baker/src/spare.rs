@@ -8,11 +8,10 @@ use crate::encode::CodingSettings;
 use crate::metrics;
 use crate::truth::spread;
 use crate::verify::{self, VerifyError};
+use rayon::prelude::*;
 
-/// What a bit is worth at first.
-const FINEST: f32 = 0.01;
-/// What it is worth then, finest first.
-const LAMBDAS_UP: [Coarser; 3] = [Coarser::Lambda(0.05), Coarser::Lambda(0.2), Coarser::Lambda(1.0)];
+/// What a bit is worth, finest first.
+const LAMBDAS_UP: [Coarser; 4] = [Coarser::Lambda(0.01), Coarser::Lambda(0.05), Coarser::Lambda(0.2), Coarser::Lambda(1.0)];
 /// Steps that positions are coded in after that: twice to eight times what they are stored in.
 const STEPS_UP: [Coarser; 3] = [Coarser::Step(1), Coarser::Step(2), Coarser::Step(3)];
 /// Frames compared.
@@ -43,30 +42,36 @@ impl Coarser {
 ///
 /// # Errors
 /// Those of `code`, and [`VerifyError`] where the player refuses a bundle.
-pub(crate) fn unseen<E: From<VerifyError>>(
+pub(crate) fn unseen<E: From<VerifyError> + Send>(
     atlas: &Atlas,
     picture: usize,
     finest: CodingSettings,
-    code: impl Fn(CodingSettings) -> Result<Vec<u8>, E>,
+    code: impl Fn(CodingSettings) -> Result<Vec<u8>, E> + Sync,
 ) -> Result<Vec<u8>, E> {
     let frames = spread(atlas.gbuffer.frames, COMPARED);
     let exact: Vec<(u32, Vec<u8>)> = frames.into_iter().map(|frame| (frame, verify::exact_frame(atlas, frame))).collect();
-    let measured = |coding: CodingSettings| -> Result<(f64, Vec<u8>, CodingSettings), E> {
+    type Measured = (f64, Vec<u8>, CodingSettings);
+    let measured = |&coding: &CodingSettings| -> Result<Measured, E> {
         let bundle = code(coding)?;
         let keys = bundle.len().saturating_sub(picture) as u64;
         Ok((metrics::worth(verify::against_pictures(&bundle, &exact)?, keys, DOUBLE), bundle, coding))
     };
-    let mut best = measured(CodingSettings { lambda: FINEST, ..finest })?;
-    for ladder in [LAMBDAS_UP, STEPS_UP] {
-        for coarser in ladder {
-            let next = measured(coarser.than(best.2))?;
-            if next.0 <= best.0 {
-                break;
+    let mut best: Option<Measured> = None;
+    for ladder in [&LAMBDAS_UP[..], &STEPS_UP] {
+        // Coding is a matter of one thread: two rungs at a time, whether or not the first of them leads on to the second.
+        'climb: for rungs in ladder.chunks(2) {
+            let coding = best.as_ref().map_or(finest, |best| best.2);
+            let codings: Vec<CodingSettings> = rungs.iter().map(|rung| rung.than(coding)).collect();
+            for next in codings.par_iter().map(measured).collect::<Vec<_>>() {
+                let next = next?;
+                if best.as_ref().is_some_and(|best| next.0 <= best.0) {
+                    break 'climb;
+                }
+                best = Some(next);
             }
-            best = next;
         }
     }
-    Ok(best.1)
+    Ok(best.map_or_else(Vec::new, |best| best.1))
 }
 
 /// The finest bundle among those that `code` makes, at what a bit is worth, that has at most so many `bytes`, within half a rung of the ladder that

@@ -13,6 +13,7 @@ use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 use obvhs::ray::{Ray, RayHit};
 use obvhs::{Boundable, BvhBuildParams};
 use rayon::prelude::*;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// How far outside a triangle, in barycentric units, a ray still counts as inside it: neighbours overlap by this much.
@@ -81,7 +82,15 @@ impl Leaf {
 /// A scene made ready for ray casting.
 pub struct Tracer<'a> {
     scene: &'a Scene,
-    hierarchy: Option<Bvh2>,
+    /// None: the scene has no triangles.
+    hierarchy: Option<Arc<Hierarchy>>,
+    /// Seconds it took.
+    pub(crate) seconds: f64,
+}
+
+/// The triangles of a scene, and boxes around them.
+struct Hierarchy {
+    boxes: Bvh2,
     leaves: Vec<Leaf>,
     /// Single-precision boxes lose the least near the origin, so everything is moved there.
     centre: DVec3,
@@ -131,8 +140,9 @@ fn build<T: Boundable>(boxes: &[T]) -> Bvh2 {
 impl<'a> Tracer<'a> {
     /// Builds the hierarchy; a scene without triangles is fine.
     pub fn new(scene: &'a Scene) -> Self {
+        let start = Instant::now();
         if scene.triangles.is_empty() {
-            return Self { scene, hierarchy: None, leaves: Vec::new(), centre: DVec3::ZERO };
+            return Self { scene, hierarchy: None, seconds: 0.0 };
         }
         let (centre, reach) = extent(scene);
         let boxes: Vec<Padded> = scene
@@ -146,8 +156,8 @@ impl<'a> Tracer<'a> {
                 Padded(Aabb::new((lo - pad).as_vec3a(), (hi + pad).as_vec3a()))
             })
             .collect();
-        let hierarchy = build(&boxes);
-        let leaves = hierarchy
+        let boxes = build(&boxes);
+        let leaves = boxes
             .primitive_indices
             .iter()
             .map(|&triangle| {
@@ -157,28 +167,38 @@ impl<'a> Tracer<'a> {
                 Leaf { corner: a, edge: [b - a, c - a], triangle, masked }
             })
             .collect();
-        Self { scene, hierarchy: Some(hierarchy), leaves, centre }
+        Self { scene, hierarchy: Some(Arc::new(Hierarchy { boxes, leaves, centre })), seconds: start.elapsed().as_secs_f64() }
+    }
+
+    /// The same for `scene`, which differs in what its screen and its frames are alone: a hierarchy takes a while to build.
+    pub fn of<'b>(&self, scene: &'b Scene) -> Tracer<'b> {
+        Tracer { scene, hierarchy: self.hierarchy.clone(), seconds: 0.0 }
+    }
+
+    /// The scene.
+    pub const fn scene(&self) -> &'a Scene {
+        self.scene
     }
 
     /// The box around all triangles, world space: smallest and largest corner. Without triangles it is inside out.
     pub fn bounds(&self) -> [DVec3; 2] {
         let corners = |l: &Leaf| [l.corner, l.corner + l.edge[0], l.corner + l.edge[1]];
-        let (lo, hi) =
-            self.leaves.iter().flat_map(corners).fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)));
-        [lo + self.centre, hi + self.centre]
+        let (leaves, centre) = self.hierarchy.as_ref().map_or((&[][..], DVec3::ZERO), |all| (&all.leaves, all.centre));
+        let (lo, hi) = leaves.iter().flat_map(corners).fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), p| (lo.min(p), hi.max(p)));
+        [lo + centre, hi + centre]
     }
 
     /// The closest hit in front of `origin`; of several at the same distance the one of the lowest triangle.
     /// Texels that a material's alpha cuts out are passed through.
     #[inline]
     pub fn hit(&self, origin: DVec3, direction: DVec3) -> Option<Hit> {
-        let hierarchy = self.hierarchy.as_ref()?;
-        let origin = origin - self.centre;
+        let Hierarchy { boxes, leaves, centre } = self.hierarchy.as_deref()?;
+        let origin = origin - centre;
         let ray = Ray::new(origin.as_vec3a(), direction.as_vec3a(), 0.0, f32::INFINITY);
         let mut best: Option<Hit> = None;
         // A RayHit carries its bound along: a fresh one for each ray.
-        hierarchy.ray_traverse(ray, &mut RayHit::none(), |_, i| {
-            let leaf = &self.leaves[i];
+        boxes.ray_traverse(ray, &mut RayHit::none(), |_, i| {
+            let leaf = &leaves[i];
             let Some((t, b, c, back)) = leaf.intersect(origin, direction) else { return f32::INFINITY };
             if let Some(best) = &best {
                 let same = (t - best.t).abs() <= SAME * best.t;

@@ -22,7 +22,13 @@ impl<'a> Truth<'a> {
     /// Builds the ray hierarchy and the texture pyramids.
     #[must_use]
     pub fn new(scene: &'a Scene) -> Self {
-        Self { scene, tracer: Tracer::new(scene), shader: Shader::new(scene) }
+        Self::by(scene, Tracer::new(scene))
+    }
+
+    /// Likewise, by a tracer of the scene.
+    #[must_use]
+    pub fn by(scene: &'a Scene, tracer: Tracer<'a>) -> Self {
+        Self { scene, tracer, shader: Shader::new(scene) }
     }
 
     /// Renders frame `frame`: R, G, B, row by row; the same bytes on any number of threads.

@@ -162,7 +162,7 @@ impl Search<'_> {
     /// Source images and grids are measured apart, then the sums of their bytes and of their errors say which pairs to bake.
     fn budget(&self, budget: u64) -> Result<Chosen, BakeError> {
         let steps = IMAGES + INTERVALS.len() * CELLS.len() + TRIES + STEPS;
-        let samples = Samples::new(self.scene);
+        let samples = Samples::new(self.cast);
         let room = usize::try_from(budget).unwrap_or(usize::MAX);
         let mut images: Vec<Image> = Vec::new();
         let mut reference: Option<Flat> = None;

@@ -22,6 +22,7 @@ mod warp;
 use crate::gbuffer::Hits;
 use crate::scene::Scene;
 use glam::DVec3;
+use rayon::prelude::*;
 use std::mem;
 use view::View;
 
@@ -248,9 +249,15 @@ pub fn build(scene: &Scene, hits: &Hits, family: Family, density: &Density, max_
     let cut = !islands.as_ref().is_some_and(|islands| islands.hold(&faces));
     let mut candidates: Vec<merge::Clusters> = Vec::new();
     let merging = cut.then(|| merge::Merging::new(scene, &faces, &links, family));
-    for (merging, &weights) in merging.iter().flat_map(|merging| family.weights().iter().map(move |weights| (merging, weights))) {
-        let mut clusters = merging.merge(weights);
-        absorb::absorb(&faces, &links, &mut clusters, hits.samples.len());
+    let merged = |merging: merge::Merging<'_>| -> Vec<merge::Clusters> {
+        let by = |&weights| {
+            let mut clusters = merging.merge(weights);
+            absorb::absorb(&faces, &links, &mut clusters, hits.samples.len());
+            clusters
+        };
+        family.weights().par_iter().map(by).collect()
+    };
+    for clusters in merging.map(merged).into_iter().flatten() {
         if candidates.iter().all(|c| c.of != clusters.of) {
             candidates.push(clusters);
         }
