@@ -3,6 +3,7 @@
 
 use super::items::Items;
 use super::search::{Laid, Search};
+use super::strip::Strip;
 use rayon::prelude::*;
 use std::cmp::Reverse;
 
@@ -52,12 +53,15 @@ impl Growing<'_> {
         let mut of = vec![level; count];
         let mut open: Vec<usize> = (1..count).collect();
         let mut lays = ALL * self.steps;
-        while let Some(i) = open.iter().copied().max_by(|&i, &j| worth(i, of[i]).total_cmp(&worth(j, of[j])).then(j.cmp(&i))) {
+        let mut strip = self.search(&of).strip_of(&laid.spots);
+        // To tell what one is worth takes long where there are thousands.
+        let mut told: Vec<f64> = (0..count).map(|i| if i == 0 { 0.0 } else { worth(i, level) }).collect();
+        while let Some(i) = open.iter().copied().max_by(|&i, &j| told[i].total_cmp(&told[j]).then(j.cmp(&i))) {
             let area = |level: usize| self.levels[level].shapes[i][0].area;
             let finer = (of[i] + 1..self.levels.len()).find(|&level| area(level) > area(of[i]));
             let taken = finer.and_then(|level| {
                 let before = std::mem::replace(&mut of[i], level);
-                let taken = self.taken(&of, &laid, i, &mut lays);
+                let taken = self.taken(&of, &laid, (i, before), &mut strip, &mut lays);
                 if taken.is_none() {
                     of[i] = before;
                 }
@@ -66,6 +70,7 @@ impl Growing<'_> {
             match taken {
                 None => open.retain(|&other| other != i),
                 Some(taken) => {
+                    told[i] = worth(i, of[i]);
                     // All lie elsewhere: there may be room where there was none.
                     if (1..count).any(|other| other != i && taken.spots[other] != laid.spots[other]) {
                         open = (1..count).collect();
@@ -90,16 +95,19 @@ impl Growing<'_> {
         (low, laid)
     }
 
-    /// Everything laid down with `one` of another size: the others stay where they are, or all lie elsewhere, which takes some of `lays`.
-    fn taken(&self, of: &[usize], laid: &Laid, one: usize, lays: &mut usize) -> Option<Laid> {
+    /// Everything laid down with `one` of another size than it had `before`: the others stay where they are in `strip`, or all lie elsewhere, which takes
+    /// some of `lays`.
+    fn taken(&self, of: &[usize], laid: &Laid, (one, before): (usize, usize), strip: &mut Strip, lays: &mut usize) -> Option<Laid> {
         let search = self.search(of);
-        if let Some(spot) = search.beside(&laid.spots, one) {
+        if let Some(spot) = search.beside(strip, &laid.spots, one, &self.levels[before].shapes[one]) {
             let mut laid = laid.clone();
             laid.spots[one] = spot;
             return Some(laid);
         }
         *lays = lays.checked_sub(EACH)?;
-        search.near(&laid.order, EACH)
+        let near = search.near(&laid.order, EACH)?;
+        *strip = search.strip_of(&near.spots);
+        Some(near)
     }
 
     fn search(&self, of: &[usize]) -> Search<'_> {

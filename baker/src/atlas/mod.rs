@@ -30,7 +30,7 @@ use thiserror::Error;
 /// Charts share labels where there would be more than this, the background's included.
 const MOST_LABELS: usize = 255;
 /// Charts that a source image can have.
-const MOST_CHARTS: usize = 1 << 15;
+const MOST_CHARTS: usize = 1 << 16;
 
 /// Frames whose keys take about as much as a source image. What a texel is worth is weighed against the whole bundle, and that of a path of few
 /// frames is hardly smaller.

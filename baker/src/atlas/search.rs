@@ -76,13 +76,28 @@ impl Search<'_> {
         Some(best).filter(|best| best.left.is_empty())
     }
 
-    /// Where one fits while the others lie where they do.
-    pub fn beside(&self, spots: &[Spot], one: usize) -> Option<Spot> {
+    /// Everything where it lies.
+    pub fn strip_of(&self, spots: &[Spot]) -> Strip {
         let mut strip = self.strip();
-        for (i, &spot) in spots.iter().enumerate().filter(|&(i, _)| i != one) {
-            strip.take(self.shapes[i].iter().find(|shape| shape.turns == spot.turns)?, spot);
+        self.lying(spots).for_each(|(_, shape, spot)| strip.take(shape, spot));
+        strip
+    }
+
+    /// Where one fits while the others lie in `strip` where they do; it lies there as `old` until then, and goes on to where nothing is found.
+    pub fn beside(&self, strip: &mut Strip, spots: &[Spot], one: usize, old: &[Shape]) -> Option<Spot> {
+        let old = old.iter().find(|shape| shape.turns == spots[one].turns)?;
+        strip.release(old, spots[one], self.lying(spots).filter(|&(i, ..)| i != one).map(|(_, shape, spot)| (shape, spot)));
+        let spot = strip.place(self.shapes[one]);
+        if spot.is_none() {
+            strip.take(old, spots[one]);
         }
-        strip.place(self.shapes[one])
+        spot
+    }
+
+    /// What lies where.
+    fn lying(&self, spots: &[Spot]) -> impl Iterator<Item = (usize, &Shape, Spot)> {
+        let of = |(i, &spot): (usize, &Spot)| Some((i, self.shapes[i].iter().find(|shape| shape.turns == spot.turns)?, spot));
+        spots.iter().enumerate().filter_map(of)
     }
 
     fn strip(&self) -> Strip {

@@ -2,6 +2,7 @@
 //! `pack` hands in masks in an order of its own and takes the places; holes inside and between masks are filled by what comes later.
 
 use super::mask::{Mask, Run, next};
+use std::ops::Range;
 
 /// The most words a row has: 1024 texels.
 const WORDS: usize = 16;
@@ -138,16 +139,51 @@ impl Strip {
 
     /// Marks a shape and its gutter as taken.
     pub fn take(&mut self, shape: &Shape, spot: Spot) {
-        let (gutter, words) = (self.gutter, self.words);
-        let all = words * self.levels;
+        let rows = self.rows(shape, spot);
+        self.mark(shape, spot, &rows);
+        self.tell(rows);
+        self.height = self.height.max(spot.y + shape.height + self.rim);
+    }
+
+    /// Takes a shape out again; `others`: all that lie in the strip besides.
+    pub fn release<'s>(&mut self, shape: &Shape, spot: Spot, others: impl Iterator<Item = (&'s Shape, Spot)>) {
+        let (rows, all) = (self.rows(shape, spot), self.words * self.levels);
+        for y in rows.clone() {
+            self.taken[y as usize * all..][..self.words].fill(0);
+        }
+        self.height = 0;
+        for (other, at) in others {
+            // Gutters of what lies beside these rows reach into them.
+            let near = self.rows(other, at);
+            if near.start < rows.end && rows.start < near.end {
+                self.mark(other, at, &rows);
+            }
+            self.height = self.height.max(at.y + other.height + self.rim);
+        }
+        self.tell(rows);
+    }
+
+    /// The rows that a shape and its gutter take something of.
+    fn rows(&self, shape: &Shape, spot: Spot) -> Range<u32> {
+        spot.y.saturating_sub(self.gutter)..(spot.y + shape.height + self.gutter).min(self.most)
+    }
+
+    /// Marks what a shape and its gutter take of `rows`, texel by texel.
+    fn mark(&mut self, shape: &Shape, spot: Spot, rows: &Range<u32>) {
+        let (gutter, all) = (self.gutter, self.words * self.levels);
         for run in &shape.runs {
             let (left, right) = ((spot.x + run.start).saturating_sub(gutter), (spot.x + run.start + run.length + gutter).min(self.width));
             let row = spot.y + run.row;
-            for y in row.saturating_sub(gutter)..(row + gutter + 1).min(self.most) {
-                set(&mut self.taken[y as usize * all..][..words], left, right);
+            for y in row.saturating_sub(gutter).max(rows.start)..(row + gutter + 1).min(rows.end) {
+                set(&mut self.taken[y as usize * all..][..self.words], left, right);
             }
         }
-        for y in spot.y.saturating_sub(gutter)..(spot.y + shape.height + gutter).min(self.most) {
+    }
+
+    /// Tells the other levels of `rows` from the lowest, and what is free there.
+    fn tell(&mut self, rows: Range<u32>) {
+        let (words, all) = (self.words, self.words * self.levels);
+        for y in rows {
             let row = &mut self.taken[y as usize * all..][..all];
             for level in 1..self.levels {
                 let (below, here) = row[(level - 1) * words..(level + 1) * words].split_at_mut(words);
@@ -156,7 +192,6 @@ impl Strip {
             }
             self.free[y as usize] = longest_free(&row[..words], self.width);
         }
-        self.height = self.height.max(spot.y + shape.height + self.rim);
     }
 }
 
@@ -254,6 +289,20 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn what_is_released_leaves_nothing_behind(sides in prop::collection::vec((1u32..30, 1u32..30), 1..12), one: prop::sample::Index, gutter in 0u32..3) {
+            let shapes: Vec<Vec<Shape>> = sides.iter().map(|&(w, h)| Shape::turns(&Mask::full(w, h), true)).collect();
+            let (mut strip, mut others) = (Strip::new(64, 512, gutter, 1), Strip::new(64, 512, gutter, 1));
+            let spots: Vec<Spot> = shapes.iter().map(|turns| strip.place(turns).expect("room")).collect();
+            let one = one.index(spots.len());
+            let lie = |i: usize| (shapes[i].iter().find(|shape| shape.turns == spots[i].turns).expect("a turn"), spots[i]);
+            let besides = || (0..spots.len()).filter(|&i| i != one).map(lie);
+            besides().for_each(|(shape, spot)| others.take(shape, spot));
+            let (shape, spot) = lie(one);
+            strip.release(shape, spot, besides());
+            prop_assert_eq!((&strip.taken, &strip.free, strip.height), (&others.taken, &others.free, others.height));
+        }
+
         #[test]
         fn gutters_are_kept(seeds in prop::collection::vec((1u32..40, 1u32..40, any::<u32>()), 1..30), gutter in 0u32..5, wide in any::<bool>()) {
             let width = if wide { 128 } else { 64 };
