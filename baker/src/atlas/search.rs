@@ -83,7 +83,7 @@ impl Search<'_> {
         strip
     }
 
-    /// Where one fits while the others lie in `strip` where they do; it lies there as `old` until then, and goes on to where nothing is found.
+    /// Where one fits while the others lie in `strip` where they do. It lies there as one of `old`, and still does where nothing is found.
     pub fn beside(&self, strip: &mut Strip, spots: &[Spot], one: usize, old: &[Shape]) -> Option<Spot> {
         let old = old.iter().find(|shape| shape.turns == spots[one].turns)?;
         strip.release(old, spots[one], self.lying(spots).filter(|&(i, ..)| i != one).map(|(_, shape, spot)| (shape, spot)));
