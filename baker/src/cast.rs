@@ -22,16 +22,17 @@ impl<'a> Cast<'a> {
     #[must_use]
     pub fn new(scene: &'a Scene, progress: &(dyn Fn(&str, f64) + Sync)) -> Self {
         progress("building the hierarchy", 0.0);
-        Self::by(scene, Tracer::new(scene), progress)
+        Self::by(Tracer::new(scene), progress)
     }
 
-    /// Likewise, by a tracer of the scene.
+    /// Likewise, by the tracer of a scene.
     #[must_use]
-    pub fn by(scene: &'a Scene, tracer: Tracer<'a>, progress: &(dyn Fn(&str, f64) + Sync)) -> Self {
-        let (start, building) = (Instant::now(), tracer.seconds);
+    pub fn by(tracer: Tracer<'a>, progress: &(dyn Fn(&str, f64) + Sync)) -> Self {
+        let (start, scene) = (Instant::now(), tracer.scene());
         let hits = Hits::cast(scene, &tracer, &|done, total| progress("casting rays", done as f64 / total.max(1) as f64));
         let gaps = Gaps::new(&hits);
-        Self { scene, tracer, hits, gaps, seconds: building + start.elapsed().as_secs_f64() }
+        let seconds = tracer.seconds + start.elapsed().as_secs_f64();
+        Self { scene, tracer, hits, gaps, seconds }
     }
 }
 

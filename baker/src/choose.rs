@@ -26,8 +26,8 @@ const GAIN: f64 = 0.1;
 /// The picture of half the size, in parts of the whole one: a little over a quarter, since outlines shrink less than areas.
 const PICTURE: f64 = 1.0 / 3.5;
 
-/// Tries the families on `scene`, whose rays `tracer` casts: those that can flatten it, the scene's own among them if it brings one or has a texture that does. Then the best of
-/// them with texels moved inside charts, unless `rewarp` says whether they are.
+/// Tries the families on the scene of `tracer`: those that can flatten it, the scene's own among them if it brings one or has a texture that does. Then
+/// the best of them with texels moved inside charts, unless `rewarp` says whether they are.
 ///
 /// # Errors
 /// [`BakeError`] where no family can bake the scene.
@@ -41,9 +41,9 @@ pub fn charts(tracer: &Tracer<'_>, settings: &Settings, rewarp: Option<bool>, pr
         &[Family::Planes, Family::Sight]
     };
     let (small, settings) = halved(scene, settings);
-    let cast = Cast::by(&small, tracer.of(&small), &|_, _| {});
+    let cast = Cast::by(tracer.of(&small), &|_, _| {});
     let hits = &cast.hits;
-    let truth = Truth::by(&small, tracer.of(&small));
+    let truth = Truth::by(tracer.of(&small));
     let pictures: Vec<(u32, Vec<u8>)> = spread(small.playback.frames, COMPARED).into_iter().map(|f| (f, truth.frame(f))).collect();
     let settings_of = |family: Family, rewarped: bool| {
         let charts = Choice { rewarped, ..family.into() };

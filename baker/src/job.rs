@@ -227,7 +227,7 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
     let options = &Options { source: atlas::Settings { outline, ..options.source }, ..*options };
     let choice_seconds = start.elapsed().as_secs_f64();
     let settings = options.settings(scene.playback.width);
-    let cast = Cast::by(scene, tracer.of(scene), progress);
+    let cast = Cast::by(tracer.of(scene), progress);
     let paint_start = Instant::now();
     let painter = (!options.plain).then(|| Painter::new(&cast, progress));
     let paint_seconds = paint_start.elapsed().as_secs_f64();
@@ -276,7 +276,7 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
     } else {
         progress("comparing with the truth", 0.0);
         let bar = |d, n| progress("comparing with the truth", part(d, n));
-        Some(verify::against_truth(&encoded.bundle, &Truth::by(scene, tracer.of(scene)), &frames, &bar)?)
+        Some(verify::against_truth(&encoded.bundle, &Truth::by(tracer.of(scene)), &frames, &bar)?)
     };
     let seconds = Seconds {
         total: options.load_seconds + tracer.seconds + start.elapsed().as_secs_f64(),

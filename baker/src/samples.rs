@@ -20,9 +20,8 @@ pub(crate) struct Samples {
 impl Samples {
     /// Renders them.
     pub(crate) fn new(cast: &Cast<'_>) -> Self {
-        let scene = cast.scene;
-        let truth = Truth::by(scene, cast.tracer.of(scene));
-        let frames = scattered(scene.playback.frames);
+        let truth = Truth::by(cast.tracer.of(cast.scene));
+        let frames = scattered(cast.scene.playback.frames);
         let pictures = frames.iter().map(|&frame| truth.frame(frame)).collect();
         Self { frames, pictures }
     }

@@ -84,7 +84,7 @@ pub struct Tracer<'a> {
     scene: &'a Scene,
     /// None: the scene has no triangles.
     hierarchy: Option<Arc<Hierarchy>>,
-    /// Seconds it took.
+    /// Seconds that building it took: none where it is another tracer's.
     pub(crate) seconds: f64,
 }
 

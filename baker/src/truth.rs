@@ -22,12 +22,13 @@ impl<'a> Truth<'a> {
     /// Builds the ray hierarchy and the texture pyramids.
     #[must_use]
     pub fn new(scene: &'a Scene) -> Self {
-        Self::by(scene, Tracer::new(scene))
+        Self::by(Tracer::new(scene))
     }
 
-    /// Likewise, by a tracer of the scene.
+    /// Likewise, by the tracer of a scene.
     #[must_use]
-    pub fn by(scene: &'a Scene, tracer: Tracer<'a>) -> Self {
+    pub fn by(tracer: Tracer<'a>) -> Self {
+        let scene = tracer.scene();
         Self { scene, tracer, shader: Shader::new(scene) }
     }
 
