@@ -9,7 +9,7 @@ use crate::lists::{CHART, FIELD};
 use crate::memory::Workspace;
 use crate::plan::Plan;
 use crate::site::{BLOCK_LOG2, Site};
-use crate::span::{self, Packed, Span, Tiles};
+use crate::span::{self, Packed, Straight, Tiles};
 use crate::torn::{Mixed, Side};
 use crate::window::Line;
 use crate::work::{Probe, Work};
@@ -31,8 +31,9 @@ pub trait Paint {
     /// A row of tiles, in windows of 2^ROWS rows of 2^WIDTH texels, `TEXELS` in all; with what is beside the last of them, `MORE`.
     fn tiles<const WIDTH: u32, const ROWS: u32, const TEXELS: usize, const MORE: usize>(&self, tiles: &Tiles<'_>, out: &mut [Self::Pixel]);
 
-    /// What row `row` of a mixed block shows of one of its sides, in such a window: the pixels that `shown` names, a bit each.
-    fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, row: u32, shown: u32, out: &mut [Self::Pixel]);
+    /// What a mixed block shows of one of its sides, in such a window: the pixels that `shown` names, a bit each, of the row that comes first in `place`; it
+    /// has as many as 2 to the power of what comes then.
+    fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, place: [u32; 2], shown: u32, out: &mut [Self::Pixel]);
 }
 
 /// Where pixels come from.
@@ -56,9 +57,9 @@ impl Paint for Probes {
     }
 
     #[inline(always)]
-    fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, row: u32, shown: u32, out: &mut [Probe]) {
+    fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, place: [u32; 2], shown: u32, out: &mut [Probe]) {
         let label = side.tile.label;
-        span::part(&side.tile, row, shown, out, [0; 2], |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(side.tile.row) });
+        span::part(&side.tile, place, shown, out, [0; 2], |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(side.tile.row) });
     }
 }
 
@@ -68,11 +69,11 @@ fn probe<const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(tiles: &Tiles<'
     let backdrop = |uv, _| Probe { label: BACKDROP as u8, at: uv };
     for (tile, pixels) in tiles.tiles.iter().zip(out.as_chunks_mut::<PIXELS>().0) {
         let window = |row: u16| Some(row).filter(|_| tile.in_window());
-        let along = |row: u16, pixels: &mut [Probe; PIXELS], line: Line| {
+        let along = |row: u16, pixels: &mut [Probe; PIXELS], line: Line<'_>| {
             span::along(pixels, line, |at: Packed<WIDTH, ROWS>| Probe { label: tile.label, at: at.at(row) });
         };
         let one = Tiles { tiles: core::slice::from_ref(tile), ..*tiles };
-        one.paint::<_, _, PIXELS, true>(pixels, window, along, backdrop);
+        one.paint::<_, _, PIXELS>(pixels, window, along, backdrop);
     }
 }
 
@@ -120,7 +121,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
         let drawn = out.len().min(width);
         let out = out.get_mut(..drawn).unwrap_or(&mut []);
         let tiles = self.plan.tile.get(..self.plan.tiles).unwrap_or(&[]);
-        let tiles = Tiles { tiles, row, log2, straight: self.site.straight(), backdrop: self.plan.backdrop };
+        let tiles = Tiles { tiles, row, log2, backdrop: self.plan.backdrop };
         let width_log2 = self.site.bundle.texture().width_log2;
         by_width(paint, &tiles, out, width_log2);
         if out.len() & (1usize << log2).wrapping_sub(1) != 0 {
@@ -154,6 +155,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
     #[inline(always)]
     fn sides<P: Paint, const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(&self, row: u32, out: &mut [P::Pixel], paint: &P) {
         let (blocks, rest) = out.as_chunks_mut::<PIXELS>();
+        let place = [row, PIXELS.trailing_zeros()];
         let whole = blocks.len();
         for side in self.plan.side.get(..self.plan.sides).unwrap_or(&[]) {
             let shown = side.shown.row(row);
@@ -162,9 +164,9 @@ impl<'d, 'a> Drawing<'d, 'a> {
             }
             // Said twice: of a known size, a loop over pixels is none.
             match blocks.get_mut(side.block as usize) {
-                Some(pixels) => paint.side::<WIDTH, ROWS>(side, row, shown, pixels),
+                Some(pixels) => paint.side::<WIDTH, ROWS>(side, place, shown, pixels),
                 // Those after it are beyond the row's end.
-                None if side.block as usize == whole => paint.side::<WIDTH, ROWS>(side, row, shown, rest),
+                None if side.block as usize == whole => paint.side::<WIDTH, ROWS>(side, place, shown, rest),
                 None => {}
             }
         }
@@ -173,12 +175,13 @@ impl<'d, 'a> Drawing<'d, 'a> {
     /// Likewise, of however many pixels a block has.
     #[inline(always)]
     fn any_sides<P: Paint, const WIDTH: u32, const ROWS: u32>(&self, row: u32, out: &mut [P::Pixel], paint: &P) {
+        let log2 = self.site.block_log2();
         for side in self.plan.side.get(..self.plan.sides).unwrap_or(&[]) {
             let shown = side.shown.row(row);
             if shown != 0
-                && let Some(pixels) = pixels(side.block, out, self.site.block_log2())
+                && let Some(pixels) = pixels(side.block, out, log2)
             {
-                paint.side::<WIDTH, ROWS>(side, row, shown, pixels);
+                paint.side::<WIDTH, ROWS>(side, [row, log2], shown, pixels);
             }
         }
     }
@@ -255,7 +258,8 @@ fn cut<P: Paint>(paint: &P, tiles: &Tiles<'_>, out: &mut [P::Pixel], width_log2:
 fn block<P: Paint>(site: &Site<'_, '_, '_>, mixed: Mixed, y: u32, pixels: &mut [P::Pixel], paint: &P, beside: Option<[i32; 2]>) {
     let log2 = site.block_log2();
     let [left_of, above] = site.offset(mixed.block.into(), y >> log2);
-    let offset = [left_of, above.wrapping_add(y & (1u32 << log2).wrapping_sub(1))];
+    let row = y & (1u32 << log2).wrapping_sub(1);
+    let offset = [left_of, above.wrapping_add(row)];
     let (texture, wide) = (site.texture, pixels.len() as u32);
     let beside = |form: Form| beside.map_or(form, |beside| form.beside(beside));
     let mut left = u32::MAX.wrapping_shr(32u32.wrapping_sub(wide));
@@ -282,7 +286,7 @@ fn block<P: Paint>(site: &Site<'_, '_, '_>, mixed: Mixed, y: u32, pixels: &mut [
             shown = span::inside(&chart, shown, wide, &forms, &texture);
         }
         if shown != 0 {
-            span::paint(pixels, shown, Span::new(&forms), &texture, |uv, x| paint.at(uv, sheet.label(), x));
+            span::paint(pixels, shown, Straight::new(&forms, row, log2), &texture, |uv, x| paint.at(uv, sheet.label(), x));
             left &= !shown;
         }
     }

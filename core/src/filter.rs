@@ -22,7 +22,7 @@ pub trait Filter: Copy {
     fn offsets(self, width_log2: u32) -> [u32; 2];
 
     /// Paints `pixels` along a line of a window; `make` turns a position, which has its offset, into one.
-    fn along<T, const WIDTH: u32, const ROWS: u32>(self, pixels: &mut [T], line: Line, make: impl Fn(Packed<WIDTH, ROWS>) -> T);
+    fn along<T, const WIDTH: u32, const ROWS: u32>(self, pixels: &mut [T], line: Line<'_>, make: impl Fn(Packed<WIDTH, ROWS>) -> T);
 
     /// The pixel at `at`, which has its offset, in a window of 2^ROWS rows of 2^WIDTH texels.
     fn packed<const WIDTH: u32, const ROWS: u32>(self, at: Packed<WIDTH, ROWS>, colour: impl Fn(usize) -> Self::Colour) -> u16;
@@ -46,7 +46,7 @@ impl Filter for Nearest {
     }
 
     #[inline(always)]
-    fn along<T, const WIDTH: u32, const ROWS: u32>(self, pixels: &mut [T], line: Line, make: impl Fn(Packed<WIDTH, ROWS>) -> T) {
+    fn along<T, const WIDTH: u32, const ROWS: u32>(self, pixels: &mut [T], line: Line<'_>, make: impl Fn(Packed<WIDTH, ROWS>) -> T) {
         span::along(pixels, line, make);
     }
 
@@ -97,7 +97,7 @@ impl Filter for Dither {
     }
 
     #[inline(always)]
-    fn along<T, const WIDTH: u32, const ROWS: u32>(self, pixels: &mut [T], line: Line, make: impl Fn(Packed<WIDTH, ROWS>) -> T) {
+    fn along<T, const WIDTH: u32, const ROWS: u32>(self, pixels: &mut [T], line: Line<'_>, make: impl Fn(Packed<WIDTH, ROWS>) -> T) {
         span::by_turns(pixels, line, self.offsets(WIDTH), make);
     }
 
@@ -179,14 +179,9 @@ impl<C: Mixed, const SWAPPED: bool> Filter for Bilinear<C, SWAPPED> {
     }
 
     #[inline(always)]
-    fn along<T, const WIDTH: u32, const ROWS: u32>(
-        self,
-        pixels: &mut [T],
-        [at, step, bend]: Line,
-        make: impl Fn(Packed<WIDTH, ROWS>) -> T,
-    ) {
+    fn along<T, const WIDTH: u32, const ROWS: u32>(self, pixels: &mut [T], line: Line<'_>, make: impl Fn(Packed<WIDTH, ROWS>) -> T) {
         let [offset, _] = self.offsets(WIDTH);
-        span::along(pixels, [at.wrapping_add(offset), step, bend], make);
+        span::along(pixels, Line { at: line.at.wrapping_add(offset), ..line }, make);
     }
 
     #[inline(always)]

@@ -78,6 +78,24 @@ impl Form {
         }
     }
 
+    /// The same where rows and columns of a patch of 2^`log2` pixels go straight to its middle, and straight on from there, about as far on one side of
+    /// the curve as on the other: the numbers along its row `row`, this form's first, by steps of the left half, which change by `bend` for the right one.
+    #[must_use]
+    pub const fn straightened(&self, row: u32, log2: u32) -> Self {
+        let half = 1u32.wrapping_shl(log2) >> 1;
+        let into = row & half.wrapping_sub(1);
+        // A parabola that is nothing at both ends of a half, r (h - r) / 2 times what changes from step to step.
+        let down = self.fall.wrapping_mul(into.wrapping_mul(half.wrapping_sub(into)) as i32) >> 1;
+        let more = self.bend.wrapping_mul(half.wrapping_sub(1) as i32) >> 1;
+        let aside = self.bend.wrapping_add(self.fall).wrapping_mul(half.wrapping_mul(half) as i32) >> 4;
+        Self {
+            at: self.at.wrapping_add(down).wrapping_sub(aside),
+            step: self.step.wrapping_add(more),
+            bend: self.bend.wrapping_mul(half as i32),
+            ..*self
+        }
+    }
+
     /// The numbers with the other sign.
     #[must_use]
     #[inline(always)]

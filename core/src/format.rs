@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// What a bundle starts with.
 pub const MAGIC: [u8; 6] = *b"CUBIST";
 /// The format's version.
-pub const VERSION: u16 = 9;
+pub const VERSION: u16 = 10;
 /// The most sections a bundle can hold.
 pub const MAX_SECTIONS: usize = 16;
 /// The most sheets a cell can hold: the tests of all but the last fit into 16 bits.

@@ -24,8 +24,10 @@ impl Axis {
     #[inline(always)]
     pub fn new(corners: [i32; 4], sums: [i32; 2]) -> Self {
         let ([a, b, c, d], [across, down]) = (corners, sums.map(|sum| sum.saturating_abs() >> 5));
-        // It goes beyond what lies around its corners by an eighth of the mean second difference each way, at most.
-        let bulge = across.wrapping_add(down).wrapping_add(1);
+        // It goes beyond what lies around its corners by an eighth of the mean second difference each way, at most; and where it is drawn straight, by
+        // an eighth of that more.
+        let bulge = across.wrapping_add(down);
+        let bulge = bulge.wrapping_add(bulge >> 3).wrapping_add(2);
         let (low, high) = (a.min(b).min(c.min(d)), a.max(b).max(c.max(d)));
         Self { corners, sums, ends: [low.wrapping_sub(bulge), high.wrapping_add(bulge)] }
     }

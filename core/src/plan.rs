@@ -302,9 +302,8 @@ impl Cells<'_> {
     /// The tiles of the cell that has these numbers at its corners, and these sums of second differences; `lane`: theirs.
     #[inline(always)]
     fn tiles<const TILES: usize>(&self, corners: [i32; 4], sums: [i32; 2], more: i32, lane: impl Fn(i32, u32) -> u32) -> [Tile; TILES] {
-        let log2 = if TILES == 1 { 3 } else { 4 };
-        let cell = Middle::new(corners, sums, log2).plus(more);
-        let tile = |right: bool| if TILES == 1 { cell } else { cell.quarter(right, self.low, log2) }.lanes(3, &lane);
+        let cell = Middle::new(corners, sums).plus(more);
+        let tile = |right: bool| if TILES == 1 { cell } else { cell.quarter(right, self.low) }.lanes(3, &lane);
         core::array::from_fn(|right| tile(right > 0))
     }
 }
@@ -312,7 +311,7 @@ impl Cells<'_> {
 /// It bulges by a 32nd of each of these `sums` of second differences: by more than rows of cells are made for.
 #[inline(always)]
 const fn bulges([across, down]: [i32; 2]) -> bool {
-    const MOST: u32 = (BULGE as u32) << 4;
+    const MOST: u32 = 14 * BULGE as u32;
     (across as u32).wrapping_add(MOST) | (down as u32).wrapping_add(MOST) >= 2 * MOST
 }
 

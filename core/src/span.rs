@@ -48,21 +48,19 @@ pub struct Tiles<'t> {
     pub row: u32,
     /// They are 2^this pixels wide.
     pub log2: u32,
-    /// They bend nowhere across.
-    pub straight: bool,
     /// Where the backdrop is, if it is of one colour.
     pub backdrop: PlayUv,
 }
 
 impl Tiles<'_> {
     /// Paints `out`, tiles of `PIXELS` pixels each. `window` gives the texels of that from some row on, in which `along` paints a line of pixels; `at`
-    /// paints one from anywhere in the picture. Where they bend nowhere across, `BENT` may be false.
+    /// paints one from anywhere in the picture.
     #[inline(always)]
-    pub fn paint<T: Copy, W: Copy, const PIXELS: usize, const BENT: bool>(
+    pub fn paint<T: Copy, W: Copy, const PIXELS: usize>(
         &self,
         out: &mut [T],
         window: impl Fn(u16) -> Option<W>,
-        along: impl Fn(W, &mut [T; PIXELS], Line),
+        along: impl Fn(W, &mut [T; PIXELS], Line<'_>),
         at: impl Fn(PlayUv, usize) -> T,
     ) {
         let (mut tiles, mut blocks) = (self.tiles, out.as_chunks_mut::<PIXELS>().0.iter_mut());
@@ -78,8 +76,7 @@ impl Tiles<'_> {
             };
             // The last tile may reach past the end.
             for (tile, pixels) in here.iter().zip(blocks.by_ref()) {
-                let [at, step, bend] = tile.row(self.row);
-                along(window, pixels, [at, step, if BENT { bend } else { 0 }]);
+                along(window, pixels, tile.row(self.row, PIXELS.trailing_zeros()));
             }
         }
     }
@@ -89,12 +86,16 @@ impl Tiles<'_> {
 #[inline(always)]
 pub fn along<T, const WIDTH: u32, const ROWS: u32>(
     pixels: &mut [T],
-    [mut at, mut step, bend]: Line,
+    Line { mut at, mut step, bend }: Line<'_>,
     make: impl Fn(Packed<WIDTH, ROWS>) -> T,
 ) {
-    for pixel in pixels {
-        *pixel = make(Packed(at));
-        (at, step) = (at.wrapping_add(step), step.wrapping_add(bend));
+    let (left, right) = pixels.split_at_mut(pixels.len() >> 1);
+    for half in [left, right] {
+        for pixel in half {
+            *pixel = make(Packed(at));
+            at = at.wrapping_add(step);
+        }
+        step = step.wrapping_add(*bend);
     }
 }
 
@@ -102,37 +103,44 @@ pub fn along<T, const WIDTH: u32, const ROWS: u32>(
 #[inline(always)]
 pub fn by_turns<T, const WIDTH: u32, const ROWS: u32>(
     pixels: &mut [T],
-    [at, step, bend]: Line,
+    Line { at, step, bend }: Line<'_>,
     [even, odd]: [u32; 2],
     make: impl Fn(Packed<WIDTH, ROWS>) -> T,
 ) {
     // Even and odd pixels each go on by two steps at a time: an offset for each pixel would take an addition more.
     let (mut first, mut second) = (at.wrapping_add(even), at.wrapping_add(step).wrapping_add(odd));
-    let (mut two, bends) = (step.wrapping_mul(2).wrapping_add(bend), bend.wrapping_mul(2));
-    for pair in pixels.as_chunks_mut::<2>().0 {
-        *pair = [make(Packed(first)), make(Packed(second))];
-        first = first.wrapping_add(two);
-        second = second.wrapping_add(two.wrapping_add(bends));
-        two = two.wrapping_add(bends.wrapping_mul(2));
+    let mut two = step.wrapping_mul(2);
+    let (left, right) = pixels.split_at_mut(pixels.len() >> 1);
+    for half in [left, right] {
+        for pair in half.as_chunks_mut::<2>().0 {
+            *pair = [make(Packed(first)), make(Packed(second))];
+            (first, second) = (first.wrapping_add(two), second.wrapping_add(two));
+        }
+        // The odd one is a step into the half.
+        second = second.wrapping_add(*bend);
+        two = two.wrapping_add((*bend).wrapping_mul(2));
     }
 }
 
-/// Paints those of `pixels`, row `row` of `tile`, that `shown` names, a bit each, moved by one of the offsets in turn.
+/// Paints those of `pixels`, row `row` of `tile` of 2^`log2` pixels, that `shown` names, a bit each, moved by one of the offsets in turn.
 #[inline(always)]
 pub fn part<T, const WIDTH: u32, const ROWS: u32>(
     tile: &Tile,
-    row: u32,
+    [row, log2]: [u32; 2],
     mut shown: u32,
     pixels: &mut [T],
     [even, odd]: [u32; 2],
     make: impl Fn(Packed<WIDTH, ROWS>) -> T,
 ) {
-    let [mut at, mut step, bend] = tile.row(row);
+    let Line { mut at, mut step, bend } = tile.row(row, log2);
     for (x, pixel) in pixels.iter_mut().enumerate() {
         if shown & 1 != 0 {
             *pixel = make(Packed(at.wrapping_add(if x & 1 == 0 { even } else { odd })));
         }
-        (shown, at, step) = (shown >> 1, at.wrapping_add(step), step.wrapping_add(bend));
+        (shown, at) = (shown >> 1, at.wrapping_add(step));
+        if x.wrapping_add(1) == 1 << log2 >> 1 {
+            step = step.wrapping_add(*bend);
+        }
     }
 }
 
@@ -176,18 +184,62 @@ impl Span {
     }
 }
 
+/// A sheet along a row of a block as it is drawn: straight to the middle, and straight on from there.
+#[derive(Clone, Copy, Debug)]
+pub struct Straight {
+    /// At the first pixel.
+    from: PlayUv,
+    /// From pixel to pixel in the left half,
+    step: PlayUv,
+    /// and how much more in the right one.
+    bend: PlayUv,
+    /// Pixels of the left half.
+    half: u32,
+}
+
+impl Straight {
+    /// The first row of `forms`, of u and v, which is row `row` of the 2^`log2` of its block.
+    #[must_use]
+    #[inline(always)]
+    pub fn new(forms: &[Form; 2], row: u32, log2: u32) -> Self {
+        let Span { from, step, bend } = Span::new(&forms.map(|form| form.straightened(row, log2)));
+        Self { from, step, bend, half: 1u32.wrapping_shl(log2) >> 1 }
+    }
+
+    /// At pixel `x`.
+    #[inline(always)]
+    fn at(&self, x: u32) -> PlayUv {
+        let (steps, bends) = (x as i32, x.saturating_sub(self.half) as i32);
+        let on = |from: i32, step: i32, bend: i32| from.wrapping_add(step.wrapping_mul(steps)).wrapping_add(bend.wrapping_mul(bends));
+        let Self { from, step, bend, .. } = self;
+        PlayUv { u: on(from.u, step.u, bend.u), v: on(from.v, step.v, bend.v) }
+    }
+
+    /// What lies around its pixels from `first` to `last`.
+    #[must_use]
+    #[inline(always)]
+    pub fn bounds(&self, first: u32, last: u32) -> Bounds {
+        let ends = Bounds::of(self.at(first), self.at(last));
+        let middle = self.at(self.half.max(first).min(last));
+        ends.join(Bounds::of(middle, middle))
+    }
+}
+
 /// Paints the pixels of `out` that `shown` names, a bit each; `make` turns a position into a pixel, given its place in `out`. Positions outside the
 /// picture count as its edge.
 #[inline(always)]
-pub fn paint<T>(out: &mut [T], mut shown: u32, mut span: Span, texture: &Texture<'_>, make: impl Fn(PlayUv, usize) -> T) {
-    let Bounds { low, high } = span.bounds(out.len() as u32);
+pub fn paint<T>(out: &mut [T], mut shown: u32, line: Straight, texture: &Texture<'_>, make: impl Fn(PlayUv, usize) -> T) {
+    let Bounds { low, high } = line.bounds(0, (out.len() as u32).wrapping_sub(1));
     let inside = texture.holds(low) && texture.holds(high);
+    let Straight { mut from, mut step, bend, half } = line;
     for (x, pixel) in out.iter_mut().enumerate() {
         if shown & 1 != 0 {
-            *pixel = make(if inside { span.from } else { texture.clamp(span.from) }, x);
+            *pixel = make(if inside { from } else { texture.clamp(from) }, x);
         }
-        shown >>= 1;
-        span.next();
+        (shown, from) = (shown >> 1, from.plus(step));
+        if x.wrapping_add(1) == half as usize {
+            step = step.plus(bend);
+        }
     }
 }
 

@@ -212,9 +212,9 @@ impl<C: Colours, F: Filter<Colour = C::Colour>> Paint for Lookup<C, F> {
     }
 
     #[inline(always)]
-    fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, row: u32, shown: u32, out: &mut [u16]) {
+    fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, place: [u32; 2], shown: u32, out: &mut [u16]) {
         let from = usize::from(side.tile.row).wrapping_shl(WIDTH);
-        span::part(&side.tile, row, shown, out, self.filter.offsets(WIDTH), |at: Packed<WIDTH, ROWS>| {
+        span::part(&side.tile, place, shown, out, self.filter.offsets(WIDTH), |at: Packed<WIDTH, ROWS>| {
             self.filter.packed(at, |index| self.colours.colour(from.wrapping_add(index)))
         });
     }
@@ -282,14 +282,12 @@ fn paint<C: Colours, F: Filter<Colour = C::Colour>, W: Copy, const WIDTH: u32, c
     colour: impl Fn(W, usize) -> C::Colour,
 ) {
     let at = |uv, x| filter.at(uv, x, colours.texture(), |index| colours.colour(index));
-    let along = |window: W, pixels: &mut [u16], line: Line| {
+    let along = |window: W, pixels: &mut [u16], line: Line<'_>| {
         filter.along(pixels, line, |at: Packed<WIDTH, ROWS>| filter.packed(at, |index| colour(window, index)));
     };
-    // Cells of four pixels are rare; most pictures are 512 texels wide, and those of models 128.
-    match (tiles.log2, WIDTH, tiles.straight) {
-        (3, 7 | 9, true) => tiles.paint::<_, W, 8, false>(out, window, |window, pixels, line| along(window, pixels, line), at),
-        (3, ..) => tiles.paint::<_, W, 8, true>(out, window, |window, pixels, line| along(window, pixels, line), at),
-        _ => tiles.paint::<_, W, 4, true>(out, window, |window, pixels, line| along(window, pixels, line), at),
+    match tiles.log2 {
+        3 => tiles.paint::<_, W, 8>(out, window, |window, pixels, line| along(window, pixels, line), at),
+        _ => tiles.paint::<_, W, 4>(out, window, |window, pixels, line| along(window, pixels, line), at),
     }
 }
 

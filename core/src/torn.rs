@@ -10,7 +10,7 @@ use crate::lists::{CHART, FIELD};
 use crate::patch::{Axis, Patch};
 use crate::sheet::Sheet;
 use crate::site::Site;
-use crate::span::{self, Span};
+use crate::span::{self, Span, Straight};
 use crate::window::{Room, Tile};
 
 /// A block that is drawn pixel by pixel: its positions fit no window, or its outlines are softened; in caller's memory.
@@ -134,10 +134,7 @@ impl Shown {
         for row in 0..1u32.wrapping_shl(log2) {
             let shown = self.row(row);
             if let Some(last) = shown.checked_ilog2() {
-                let first = shown.trailing_zeros();
-                let [u, v] = &forms;
-                let from = [u.from([first, 0]), v.from([first, 0])];
-                let here = Span::new(&from).bounds(last.wrapping_sub(first).wrapping_add(1));
+                let here = Straight::new(&forms, row, log2).bounds(shown.trailing_zeros(), last);
                 let all = bounds.join(here);
                 (bounds, window) = match room.row(&all, window) {
                     Some(window) => (all, window),

@@ -6,22 +6,20 @@ use crate::form::rounded;
 use crate::key::BACKDROP;
 use crate::patch::Patch;
 
-/// A tile, in caller's memory: a patch of a block, as `form::Form` has one, of positions in a window, or differences of such, as
-/// `span::Packed` holds them.
+/// A tile, in caller's memory: a patch of a block of positions in a window, or differences of such, as `span::Packed` holds them. What curves goes
+/// straight to the tile's middle instead, and straight on from there, along rows and down columns.
 #[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub struct Tile {
-    /// Where its first pixel is in its first row.
+    /// How far it is from row to row in the first column, in the upper half and in the lower one.
+    pub down: [u32; 2],
+    /// Where the first pixel of its middle row is, the first of the lower half.
     pub at: u32,
-    /// How far it is from there to the next row,
-    pub down: u32,
-    /// and how that changes from row to row.
-    pub fall: u32,
-    /// How far it is from pixel to pixel at first,
+    /// How far it is from pixel to pixel in the left half of that row,
     pub step: u32,
     /// how that changes from row to row,
     pub turn: u32,
-    /// and from pixel to pixel.
+    /// and from the left half to the right one.
     pub bend: u32,
     /// The window's first row.
     pub row: u16,
@@ -31,12 +29,20 @@ pub struct Tile {
     pub run: u8,
 }
 
-/// The pixels of a tile's row: where the first is, how far it is to the next, and how that changes.
-pub type Line = [u32; 3];
+/// The pixels of a tile's row.
+#[derive(Clone, Copy, Debug)]
+pub struct Line<'t> {
+    /// Where the first is,
+    pub at: u32,
+    /// how far it is to the next,
+    pub step: u32,
+    /// and how that changes halfway: still in the tile, since until then small processors need their registers for other numbers.
+    pub bend: &'t u32,
+}
 
 impl Tile {
     /// One that shows nothing: its block is drawn in another way.
-    pub const NONE: Self = Self { at: 0, down: 0, fall: 0, step: 0, turn: 0, bend: 0, row: u16::MAX, label: 0, run: 1 };
+    pub const NONE: Self = Self { down: [0; 2], at: 0, step: 0, turn: 0, bend: 0, row: u16::MAX, label: 0, run: 1 };
     /// One that shows the backdrop's one colour.
     pub const PLAIN: Self = Self { row: u16::MAX - 1, label: BACKDROP as u8, ..Self::NONE };
 
@@ -65,10 +71,10 @@ impl Tile {
     #[must_use]
     #[inline(always)]
     pub const fn plus(&self, other: &Self) -> Self {
+        let ([upper, lower], [also_upper, also_lower]) = (self.down, other.down);
         Self {
+            down: [upper.wrapping_add(also_upper), lower.wrapping_add(also_lower)],
             at: self.at.wrapping_add(other.at),
-            down: self.down.wrapping_add(other.down),
-            fall: self.fall.wrapping_add(other.fall),
             step: self.step.wrapping_add(other.step),
             turn: self.turn.wrapping_add(other.turn),
             bend: self.bend.wrapping_add(other.bend),
@@ -76,29 +82,28 @@ impl Tile {
         }
     }
 
-    /// One of 2^`log2` pixels of which all numbers are told around its middle, where half of the rows and columns are on either side: rounded there, they
-    /// add up to least.
+    /// One of 2^`log2` pixels that is told down its middle column, counted from the first one instead.
     #[must_use]
     #[inline(always)]
     pub const fn from_middle(self, log2: u32) -> Self {
-        let Self { at, down, fall, step, turn, bend, .. } = self;
+        let Self { down: [upper, lower], at, step, turn, .. } = self;
         let half = 1u32.wrapping_shl(log2) >> 1;
-        let curves = bend.wrapping_add(fall).wrapping_mul(half.wrapping_mul(half.wrapping_add(1)) >> 1);
-        let steps = step.wrapping_add(down).wrapping_sub(half.wrapping_mul(turn)).wrapping_mul(half);
-        Self {
-            at: at.wrapping_add(curves).wrapping_sub(steps),
-            down: down.wrapping_sub(half.wrapping_mul(turn.wrapping_add(fall))),
-            step: step.wrapping_sub(half.wrapping_mul(turn.wrapping_add(bend))),
-            ..self
-        }
+        let turns = half.wrapping_mul(turn);
+        Self { down: [upper.wrapping_sub(turns), lower.wrapping_sub(turns)], at: at.wrapping_sub(half.wrapping_mul(step)), ..self }
     }
 
-    /// Row `row` of its own.
+    /// Row `row` of its 2^`log2`.
     #[inline(always)]
-    pub const fn row(&self, row: u32) -> Line {
-        let falls = row.wrapping_mul(row.wrapping_sub(1)) >> 1;
-        let at = self.at.wrapping_add(self.down.wrapping_mul(row)).wrapping_add(self.fall.wrapping_mul(falls));
-        [at, self.step.wrapping_add(self.turn.wrapping_mul(row)), self.bend]
+    pub const fn row(&self, row: u32, log2: u32) -> Line<'_> {
+        let half = 1u32.wrapping_shl(log2) >> 1;
+        let rows = row.wrapping_sub(half);
+        let [upper, lower] = self.down;
+        let down = if row < half { upper } else { lower };
+        Line {
+            at: self.at.wrapping_add(down.wrapping_mul(rows)),
+            step: self.step.wrapping_add(self.turn.wrapping_mul(rows)),
+            bend: &self.bend,
+        }
     }
 }
 
@@ -168,7 +173,7 @@ impl Window {
     #[inline(always)]
     fn packed(self, patch: &Patch, row: u16, log2: u32) -> Tile {
         let Patch { u, v } = patch;
-        let (u, v) = (Middle::new(u.corners, u.sums, log2), Middle::new(v.corners, v.sums, log2));
+        let (u, v) = (Middle::new(u.corners, u.sums), Middle::new(v.corners, v.sums));
         let first = i32::from(row).wrapping_shl(16);
         let v = v.plus(first.wrapping_neg()).lanes(log2, |x, log2| self.lane::<true>(x, log2));
         v.plus(&u.lanes(log2, |x, log2| self.lane::<false>(x, log2))).from_middle(log2)
@@ -180,9 +185,9 @@ impl Window {
 pub struct Middle {
     /// In the middle.
     at: i32,
-    /// How far it is from there to the next pixel, times twice as many as there are in a row,
+    /// How it changes there from pixel to pixel, times twice as many as there are in a row,
     step: i32,
-    /// and to the next row, likewise;
+    /// and from row to row, likewise;
     down: i32,
     /// how the former changes from row to row, times all pixels of the patch.
     turn: i32,
@@ -201,41 +206,35 @@ impl Middle {
 
     /// Given the number at the corners, and the sums of second differences.
     #[inline(always)]
-    pub const fn new([a, b, c, d]: [i32; 4], [across, down]: [i32; 2], log2: u32) -> Self {
+    pub const fn new([a, b, c, d]: [i32; 4], [across, down]: [i32; 2]) -> Self {
         let (above, below, left) = (b.wrapping_sub(a), d.wrapping_sub(c), c.wrapping_sub(a));
         let (sum, turn, twice) = (above.wrapping_add(below), below.wrapping_sub(above), left.wrapping_mul(2));
-        // The middle is an eighth of a mean second difference off the mean of the corners, and a step from it half a pixel's such off the mean one.
-        let part = log2.wrapping_add(2);
+        // The middle is an eighth of a mean second difference off the mean of the corners, either way.
         Self {
-            at: a.wrapping_add(sum.wrapping_add(twice) >> 2).wrapping_sub(across >> 5).wrapping_sub(down >> 5),
-            step: sum.wrapping_add(across.wrapping_shr(part)),
-            down: twice.wrapping_add(turn).wrapping_add(down.wrapping_shr(part)),
+            at: a.wrapping_add(sum.wrapping_add(twice) >> 2).wrapping_sub(across.wrapping_add(down) >> 5),
+            step: sum,
+            down: twice.wrapping_add(turn),
             turn,
             bend: across,
             fall: down,
         }
     }
 
-    /// Of the patch's quarter to the left or to the right, above or below; the patch is 2^`log2` pixels wide and high.
+    /// Of the patch's quarter to the left or to the right, above or below.
     #[must_use]
     #[inline(always)]
-    pub const fn quarter(&self, right: bool, low: bool, log2: u32) -> Self {
+    pub const fn quarter(&self, right: bool, low: bool) -> Self {
         let Self { at, step, down, turn, bend, fall } = *self;
         // What is a quarter of the way off the middle, on either side.
         const fn aside(x: i32, right: bool) -> i32 {
             if right { x } else { x.wrapping_neg() }
-        }
-        // A curve there, x (x - 1) / 2 times a second difference.
-        const fn curve(change: i32, right: bool, log2: u32) -> i32 {
-            (change >> 7).wrapping_sub(aside(change.wrapping_shr(log2.wrapping_add(5)), right))
         }
         Self {
             at: at
                 .wrapping_add(aside(step >> 3, right))
                 .wrapping_add(aside(down >> 3, low))
                 .wrapping_add(aside(turn >> 4, right == low))
-                .wrapping_add(curve(bend, right, log2))
-                .wrapping_add(curve(fall, low, log2)),
+                .wrapping_add(bend.wrapping_add(fall) >> 7),
             step: (step >> 1).wrapping_add(aside(turn >> 2, low)).wrapping_add(aside(bend >> 4, right)),
             down: (down >> 1).wrapping_add(aside(turn >> 2, right)).wrapping_add(aside(fall >> 4, low)),
             turn: turn >> 2,
@@ -244,13 +243,21 @@ impl Middle {
         }
     }
 
-    /// The same in its lane, of a tile of 2^`log2` pixels.
+    /// The same in its lane, of a tile of 2^`log2` pixels, down the middle column.
     #[inline(always)]
     pub fn lanes(&self, log2: u32, lane: impl Fn(i32, u32) -> u32) -> Tile {
-        let twice = log2.wrapping_mul(2);
-        let [step, down] = [self.step, self.down].map(|step| lane(step, log2.wrapping_add(1)));
-        let [bend, fall] = [self.bend, self.fall].map(|change| lane(change, twice.wrapping_add(2)));
-        Tile { at: lane(self.at, 0), down, fall, step, turn: lane(self.turn, twice), bend, ..Tile::default() }
+        let Self { at, step, down, turn, bend, fall } = *self;
+        // From the middle on, on either side, to the edge's place there.
+        let (part, steeper) = (log2.wrapping_add(1), fall >> 3);
+        Tile {
+            down: [lane(down.wrapping_sub(steeper), part), lane(down.wrapping_add(steeper), part)],
+            // As far to the one side of the curve in the middle and at the edges as to the other in between, or nearly.
+            at: lane(at.wrapping_sub(bend.wrapping_add(fall) >> 8), 0),
+            step: lane(step.wrapping_sub(bend >> 3), part),
+            turn: lane(turn, log2.wrapping_mul(2)),
+            bend: lane(bend, log2.wrapping_add(3)),
+            ..Tile::default()
+        }
     }
 }
 

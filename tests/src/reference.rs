@@ -308,11 +308,19 @@ impl<'a> Reference<'a> {
             // Outside the picture no edge is nearer than the picture's own.
             margin = at.iter().zip(size).map(|(x, size)| (x - x.round().clamp(0.0, size)).abs()).fold(margin, f64::min);
             if last || shows {
-                let at = [0, 1].map(|axis: usize| at[axis].clamp(0.0, size[axis] - EDGE));
+                let drawn = sheet.position.map(|of| of.drawn(within, self.pieces()));
+                margin = drawn.iter().zip(size).map(|(x, size)| (x - x.round().clamp(0.0, size)).abs()).fold(margin, f64::min);
+                let at = [0, 1].map(|axis: usize| drawn[axis].clamp(0.0, size[axis] - EDGE));
                 return Some(Pixel { label: sheet.label, at, colour: self.colour(at), motion, margin, outline, shift, reach });
             }
         }
         None
+    }
+
+    /// How many pieces of a cell positions go straight in, across and down, where a colour is looked up: two a tile.
+    fn pieces(&self) -> f64 {
+        let cell = 1u32 << self.grid.log2;
+        f64::from(2 * cell / tile(cell))
     }
 
     /// Width and height of the source image, texels.
@@ -412,10 +420,27 @@ impl Patch {
 
     /// The number `x` and `y` of the way through the cell: the parabolas that the second derivatives make are nothing at the corners.
     #[must_use]
-    pub fn at(&self, [x, y]: [f64; 2]) -> f64 {
+    pub fn at(&self, at: [f64; 2]) -> f64 {
+        self.bent(at, at.map(|x| x * (x - 1.0)))
+    }
+
+    /// The same where these parabolas are straight in each of so many `pieces` of the cell, across and down.
+    #[must_use]
+    pub fn drawn(&self, at: [f64; 2], pieces: f64) -> f64 {
+        self.bent(
+            at,
+            at.map(|x| {
+                let [from, to] = [(x * pieces).floor(), (x * pieces).floor() + 1.0].map(|edge| edge / pieces);
+                from * (from - 1.0) + (x - from) * pieces * (to * (to - 1.0) - from * (from - 1.0)) - 1.0 / (8.0 * pieces * pieces)
+            }),
+        )
+    }
+
+    /// The same with these in place of x (x - 1) and y (y - 1).
+    fn bent(&self, [x, y]: [f64; 2], [across, down]: [f64; 2]) -> f64 {
         let [a, b, c, d] = self.corners;
         let (left, right) = (a + (c - a) * y, b + (d - b) * y);
-        left + (right - left) * x + self.across / 2.0 * x * (x - 1.0) + self.down / 2.0 * y * (y - 1.0)
+        left + (right - left) * x + (self.across * across + self.down * down) / 2.0
     }
 
     /// How far it is from `value` at most: in a corner, or where it bulges between them.
@@ -472,8 +497,7 @@ pub fn tile(cell: u32) -> u32 {
 
 /// How far the player's positions may be off in tiles, texels, in a picture 2^`width_log2` texels wide. In tiles of n pixels the position in the middle,
 /// the steps from there along both axes and how the one changes along the other are each half a unit off: at the first pixel, n / 2 of either away, the
-/// farthest of all, that adds up to 1 / 2 + n / 2 + n^2 / 8 units; where space is cubic, how either step changes along its own axis is too, over
-/// n (n + 2) / 8.
+/// farthest of all, that adds up to 1 / 2 + n / 2 + n^2 / 8 units; where space is cubic, how a step differs in the right half, over n / 4.
 #[must_use]
 pub fn packed(cell: u32, space: u8, width_log2: u32) -> f64 {
     let units = match width_log2 {
@@ -482,7 +506,7 @@ pub fn packed(cell: u32, space: u8, width_log2: u32) -> f64 {
         _ => f64::INFINITY,
     };
     let side = f64::from(tile(cell));
-    let bent = if space == SPACE_CUBIC { side * (side + 2.0) / 8.0 } else { 0.0 };
+    let bent = if space == SPACE_CUBIC { side / 4.0 } else { 0.0 };
     (0.5 + side / 2.0 + side * side / 8.0 + bent) / units
 }
 

@@ -5,8 +5,8 @@
 //! - a layer in time to nearest: 1 / 2^17;
 //! - the left and the right end of a span downwards: 1 / 2^16;
 //! - the step along it to nearest: (cell - 1) / 2^17 at its last pixel.
-//! - for a look-up, positions are packed in tiles of up to 16 by 16 pixels, to the nearest of 256 steps a texel, and so are the step along a row,
-//!   that from row to row and how each of these changes (`reference::packed`): n^2 / 2 steps in tiles of n by n, n^2 / 8 more where space is cubic.
+//! - for a look-up, positions are packed in tiles of up to 8 by 8 pixels, to the nearest of 256 steps a texel, and so are the step along a row,
+//!   those from row to row and how the former changes (`reference::packed`): 12.5 steps in tiles of 8 by 8, 2 more where space is cubic.
 //!
 //! Where space is cubic, what the nodes around add to a cell makes its positions up to 3/2 as far off as its layers. Both second differences are
 //! rounded to nearest, which adds up to cell^2 / 8 times 1 / 2^17 each; what they add to an edge and to the step across is rounded downwards:
