@@ -273,7 +273,8 @@ struct Cells<'r> {
 impl Cells<'_> {
     /// How far nodes keep from the edges of a window, Q16 texels.
     const fn margin(&self) -> i32 {
-        self.room.margin.wrapping_add(BULGE)
+        // Drawn straight, they bulge by an eighth more.
+        self.room.margin.wrapping_add(BULGE + BULGE / 8)
     }
 
     /// How much of 2^`log2` texels of a window is further than that from its edges, Q16. Counted from the margin on, what is inside is not negative and below
@@ -311,7 +312,7 @@ impl Cells<'_> {
 /// It bulges by a 32nd of each of these `sums` of second differences: by more than rows of cells are made for.
 #[inline(always)]
 const fn bulges([across, down]: [i32; 2]) -> bool {
-    const MOST: u32 = 14 * BULGE as u32;
+    const MOST: u32 = (BULGE as u32) << 4;
     (across as u32).wrapping_add(MOST) | (down as u32).wrapping_add(MOST) >= 2 * MOST
 }
 

@@ -183,7 +183,7 @@ impl Window {
 /// How a number goes around the middle of a patch.
 #[derive(Clone, Copy, Debug)]
 pub struct Middle {
-    /// In the middle.
+    /// In the middle, as it is drawn.
     at: i32,
     /// How it changes there from pixel to pixel, times twice as many as there are in a row,
     step: i32,
@@ -209,9 +209,10 @@ impl Middle {
     pub const fn new([a, b, c, d]: [i32; 4], [across, down]: [i32; 2]) -> Self {
         let (above, below, left) = (b.wrapping_sub(a), d.wrapping_sub(c), c.wrapping_sub(a));
         let (sum, turn, twice) = (above.wrapping_add(below), below.wrapping_sub(above), left.wrapping_mul(2));
-        // The middle is an eighth of a mean second difference off the mean of the corners, either way.
+        // The middle is an eighth of a mean second difference off the mean of the corners, either way; and where a tile is drawn, an eighth of that more.
+        let bulge = across.wrapping_add(down);
         Self {
-            at: a.wrapping_add(sum.wrapping_add(twice) >> 2).wrapping_sub(across.wrapping_add(down) >> 5),
+            at: a.wrapping_add(sum.wrapping_add(twice) >> 2).wrapping_sub(bulge.wrapping_add(bulge >> 3) >> 5),
             step: sum,
             down: twice.wrapping_add(turn),
             turn,
@@ -225,6 +226,7 @@ impl Middle {
     #[inline(always)]
     pub const fn quarter(&self, right: bool, low: bool) -> Self {
         let Self { at, step, down, turn, bend, fall } = *self;
+        let bulge = bend.wrapping_add(fall);
         // What is a quarter of the way off the middle, on either side.
         const fn aside(x: i32, right: bool) -> i32 {
             if right { x } else { x.wrapping_neg() }
@@ -234,7 +236,9 @@ impl Middle {
                 .wrapping_add(aside(step >> 3, right))
                 .wrapping_add(aside(down >> 3, low))
                 .wrapping_add(aside(turn >> 4, right == low))
-                .wrapping_add(bend.wrapping_add(fall) >> 7),
+                // A curve's; and the whole is drawn further off its curve than its quarter.
+                .wrapping_add(bulge >> 7)
+                .wrapping_add(bulge.wrapping_sub(bulge >> 2) >> 8),
             step: (step >> 1).wrapping_add(aside(turn >> 2, low)).wrapping_add(aside(bend >> 4, right)),
             down: (down >> 1).wrapping_add(aside(turn >> 2, right)).wrapping_add(aside(fall >> 4, low)),
             turn: turn >> 2,
@@ -251,8 +255,7 @@ impl Middle {
         let (part, steeper) = (log2.wrapping_add(1), fall >> 3);
         Tile {
             down: [lane(down.wrapping_sub(steeper), part), lane(down.wrapping_add(steeper), part)],
-            // As far to the one side of the curve in the middle and at the edges as to the other in between, or nearly.
-            at: lane(at.wrapping_sub(bend.wrapping_add(fall) >> 8), 0),
+            at: lane(at, 0),
             step: lane(step.wrapping_sub(bend >> 3), part),
             turn: lane(turn, log2.wrapping_mul(2)),
             bend: lane(bend, log2.wrapping_add(3)),
