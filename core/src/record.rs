@@ -76,7 +76,7 @@ const LIST_ROWS: usize = 4;
 /// What a byte, a layer of a row of nodes and a slice of lists cost to code, in parts of equal time, a part being what a byte of the lists of the cells
 /// around costs beside: fitted to counted instructions, of which that misses a twelfth.
 pub const BYTE_COST: u32 = 5;
-const LAYER_COST: u32 = 4;
+const LAYER_COST: u32 = 5;
 const LIST_COST: u32 = 200;
 
 impl Place {

@@ -232,14 +232,16 @@ pub fn paint<T>(out: &mut [T], mut shown: u32, line: Straight, texture: &Texture
     let Bounds { low, high } = line.bounds(0, (out.len() as u32).wrapping_sub(1));
     let inside = texture.holds(low) && texture.holds(high);
     let Straight { mut from, mut step, bend, half } = line;
-    for (x, pixel) in out.iter_mut().enumerate() {
-        if shown & 1 != 0 {
-            *pixel = make(if inside { from } else { texture.clamp(from) }, x);
+    let (left, right) = out.split_at_mut((half as usize).min(out.len()));
+    let mut x = 0usize;
+    for half in [left, right] {
+        for pixel in half {
+            if shown & 1 != 0 {
+                *pixel = make(if inside { from } else { texture.clamp(from) }, x);
+            }
+            (shown, x, from) = (shown >> 1, x.wrapping_add(1), from.plus(step));
         }
-        (shown, from) = (shown >> 1, from.plus(step));
-        if x.wrapping_add(1) == half as usize {
-            step = step.plus(bend);
-        }
+        step = step.plus(bend);
     }
 }
 
