@@ -45,8 +45,9 @@
 //!    where these carry the layer too.
 //! 2. **Space.** Where space is *linear*, each sheet's position is bilinear between its cell's four corners. Where it is *cubic*, it bends
 //!    between them besides, evenly across and evenly down: by the mean second differences of positions at the corners, told from the nodes
-//!    around as far as these carry the layer (the four-point rule: Dyn, Levin, Gregory 1987). Nearly as good as cells half as large, at no bytes. Along a
-//!    row of pixels either is two additions a pixel.
+//!    around as far as these carry the layer (the four-point rule: Dyn, Levin, Gregory 1987). Nearly as good as cells half as large, at no bytes. Where
+//!    a colour is looked up it goes straight to the middle of a tile of at most 8 by 8 pixels and straight on from there, about as far on one side of
+//!    the curve as on the other: one addition a pixel.
 //! 3. **Coverage.** In a torn cell the frontmost sheet that covers a pixel shows; the last covers whatever is left. A sheet covers
 //!    a pixel by one of three tests, which its list names. The *chart* test: its position lies inside its label's rectangle, and in
 //!    the mask if the chart does not fill that. The *field* test, for outlines that no chart has, such as a cone's silhouette: a

@@ -107,18 +107,19 @@ pub fn by_turns<T, const WIDTH: u32, const ROWS: u32>(
     [even, odd]: [u32; 2],
     make: impl Fn(Packed<WIDTH, ROWS>) -> T,
 ) {
-    // Even and odd pixels each go on by two steps at a time: an offset for each pixel would take an addition more.
-    let (mut first, mut second) = (at.wrapping_add(even), at.wrapping_add(step).wrapping_add(odd));
-    let mut two = step.wrapping_mul(2);
+    // It is further from even pixels to odd ones than back, by how far the offsets are apart, either way: an offset for each pixel would take an addition
+    // more.
+    let apart = odd.wrapping_sub(even);
+    let (mut at, mut there, mut back) = (at.wrapping_add(even), step.wrapping_add(apart), step.wrapping_sub(apart));
     let (left, right) = pixels.split_at_mut(pixels.len() >> 1);
     for half in [left, right] {
-        for pair in half.as_chunks_mut::<2>().0 {
-            *pair = [make(Packed(first)), make(Packed(second))];
-            (first, second) = (first.wrapping_add(two), second.wrapping_add(two));
+        for [first, second] in half.as_chunks_mut::<2>().0 {
+            *first = make(Packed(at));
+            at = at.wrapping_add(there);
+            *second = make(Packed(at));
+            at = at.wrapping_add(back);
         }
-        // The odd one is a step into the half.
-        second = second.wrapping_add(*bend);
-        two = two.wrapping_add((*bend).wrapping_mul(2));
+        (there, back) = (there.wrapping_add(*bend), back.wrapping_add(*bend));
     }
 }
 
