@@ -31,8 +31,8 @@ pub trait Paint {
     /// A row of tiles, in windows of 2^ROWS rows of 2^WIDTH texels, `TEXELS` in all; with what is beside the last of them, `MORE`.
     fn tiles<const WIDTH: u32, const ROWS: u32, const TEXELS: usize, const MORE: usize>(&self, tiles: &Tiles<'_>, out: &mut [Self::Pixel]);
 
-    /// What a mixed block shows of one of its sides, in such a window: the pixels that `shown` names, a bit each, of the row that comes first in `place`; it
-    /// has as many as 2 to the power of what comes then.
+    /// What a row of a mixed block shows of one of its sides, in such a window: the pixels that `shown` names, a bit each. `place`: which row, and the
+    /// logarithm of how many there are.
     fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, place: [u32; 2], shown: u32, out: &mut [Self::Pixel]);
 }
 

@@ -235,8 +235,8 @@ pub fn paint<T>(out: &mut [T], mut shown: u32, line: Straight, texture: &Texture
     let Straight { mut from, mut step, bend, half } = line;
     let (left, right) = out.split_at_mut((half as usize).min(out.len()));
     let mut x = 0usize;
-    for half in [left, right] {
-        for pixel in half {
+    for pixels in [left, right] {
+        for pixel in pixels {
             if shown & 1 != 0 {
                 *pixel = make(if inside { from } else { texture.clamp(from) }, x);
             }

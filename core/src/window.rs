@@ -345,8 +345,8 @@ impl Room {
 }
 
 /// How far positions of tiles of 2^`log2` pixels keep from the edges of picture and window, Q16 texels, beside what pixels reach to: rounding moves
-/// them by less. All numbers of a tile of n pixels are off by up to half a unit in its middle, 1/512 texel at most: in a corner by n^2 / 4 units, and
-/// n and a bit more.
+/// them by less. All numbers of a tile of n pixels are off by up to half a unit in its middle, 1/512 texel at most: in a corner by n^2 / 8 units, and
+/// n.
 #[must_use]
 const fn margin(log2: u32) -> i32 {
     1i32.wrapping_shl(log2.wrapping_mul(2).wrapping_add(7))

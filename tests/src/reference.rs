@@ -306,10 +306,12 @@ impl<'a> Reference<'a> {
             }
             motion = motion.max(sheet.motion);
             // Outside the picture no edge is nearer than the picture's own.
-            margin = at.iter().zip(size).map(|(x, size)| (x - x.round().clamp(0.0, size)).abs()).fold(margin, f64::min);
+            let to_edge =
+                |at: [f64; 2]| at.iter().zip(size).map(|(x, size)| (x - x.round().clamp(0.0, size)).abs()).fold(f64::INFINITY, f64::min);
+            margin = margin.min(to_edge(at));
             if last || shows {
                 let drawn = sheet.position.map(|of| of.drawn(within, self.pieces()));
-                margin = drawn.iter().zip(size).map(|(x, size)| (x - x.round().clamp(0.0, size)).abs()).fold(margin, f64::min);
+                margin = margin.min(to_edge(drawn));
                 let at = [0, 1].map(|axis: usize| drawn[axis].clamp(0.0, size[axis] - EDGE));
                 return Some(Pixel { label: sheet.label, at, colour: self.colour(at), motion, margin, outline, shift, reach });
             }
@@ -427,13 +429,13 @@ impl Patch {
     /// The same where these parabolas are straight in each of so many `pieces` of the cell, across and down.
     #[must_use]
     pub fn drawn(&self, at: [f64; 2], pieces: f64) -> f64 {
-        self.bent(
-            at,
-            at.map(|x| {
-                let [from, to] = [(x * pieces).floor(), (x * pieces).floor() + 1.0].map(|edge| edge / pieces);
-                from * (from - 1.0) + (x - from) * pieces * (to * (to - 1.0) - from * (from - 1.0)) - 1.0 / (8.0 * pieces * pieces)
-            }),
-        )
+        let parabola = |x: f64| x * (x - 1.0);
+        let straight = |x: f64| {
+            let from = (x * pieces).floor() / pieces;
+            let [first, last] = [from, from + 1.0 / pieces].map(parabola);
+            first + (x - from) * pieces * (last - first) - 1.0 / (8.0 * pieces * pieces)
+        };
+        self.bent(at, at.map(straight))
     }
 
     /// The same with these in place of x (x - 1) and y (y - 1).
