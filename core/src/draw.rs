@@ -2,6 +2,7 @@
 //! The plan is in the caller's memory; pixels go to the caller's row, as `player` asks. What fits no plan is drawn pixel by pixel.
 
 use crate::Bundle;
+use crate::atlas::Texture;
 use crate::fixed::PlayUv;
 use crate::form::Form;
 use crate::key::BACKDROP;
@@ -73,7 +74,7 @@ fn probe<const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(tiles: &Tiles<'
             span::along(pixels, line, |at: Packed<WIDTH, ROWS>| Probe { label: tile.label, at: at.at(row) });
         };
         let one = Tiles { tiles: core::slice::from_ref(tile), ..*tiles };
-        one.paint::<_, _, PIXELS>(pixels, window, along, backdrop);
+        one.paint::<_, _, PIXELS>(pixels, false, window, along, backdrop);
     }
 }
 
@@ -85,21 +86,21 @@ pub struct Drawing<'d, 'a> {
 }
 
 impl<'d, 'a> Drawing<'d, 'a> {
-    /// The row of cells that `space` holds, the palette, and what is spread of it.
-    pub fn new(bundle: &'d Bundle<'a>, space: &'d mut Workspace<'a>) -> (Self, (&'d [u16], &'d [u32]))
+    /// The row of cells that `space` holds, the source image, the palette, and what is spread of it.
+    pub fn new(bundle: &'d Bundle<'a>, space: &'d mut Workspace<'a>) -> (Self, (&'d Texture<'a>, &'d [u16], &'d [u32]))
     where
         'a: 'd,
     {
         let Workspace { texture, rows: [top, bottom, _], sheets, charts, plan, palette, spread, backdrop, .. } = space;
-        let site = Site { bundle, texture: *texture, rows: [top, bottom], sheets, charts, backdrop: backdrop.as_ref() };
-        (Self { site, plan }, (palette, spread))
+        let site = Site { bundle, texture, rows: [top, bottom], sheets, charts, backdrop: backdrop.as_ref() };
+        (Self { site, plan }, (texture, palette, spread))
     }
 
     /// Draws pixel row `y`, which lies in the row of cells.
     #[inline(always)]
     pub fn row<P: Paint>(&mut self, y: u32, out: &mut [P::Pixel], work: &mut Work, paint: &P) {
         let out = self.tiles(y, out, work, paint, false);
-        match self.site.bundle.texture().width_log2 {
+        match self.site.texture.width_log2 {
             7 => self.mix::<P, 7, 7>(y, out, paint),
             8 => self.mix::<P, 8, 6>(y, out, paint),
             9 => self.mix::<P, 9, 6>(y, out, paint),
@@ -122,7 +123,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
         let out = out.get_mut(..drawn).unwrap_or(&mut []);
         let tiles = self.plan.tile.get(..self.plan.tiles).unwrap_or(&[]);
         let tiles = Tiles { tiles, row, log2, backdrop: self.plan.backdrop };
-        let width_log2 = self.site.bundle.texture().width_log2;
+        let width_log2 = self.site.texture.width_log2;
         by_width(paint, &tiles, out, width_log2);
         if out.len() & (1usize << log2).wrapping_sub(1) != 0 {
             cut(paint, &tiles, out, width_log2);
@@ -283,10 +284,10 @@ fn block<P: Paint>(site: &Site<'_, '_, '_>, mixed: Mixed, y: u32, pixels: &mut [
         }
         let forms = site.forms(sheet, offset).map(beside);
         if tested && sheet.test() != FIELD {
-            shown = span::inside(&chart, shown, wide, &forms, &texture);
+            shown = span::inside(&chart, shown, wide, &forms, texture);
         }
         if shown != 0 {
-            span::paint(pixels, shown, Straight::new(&forms, row, log2), &texture, |uv, x| paint.at(uv, sheet.label(), x));
+            span::paint(pixels, shown, Straight::new(&forms, row, log2), texture, |uv, x| paint.at(uv, sheet.label(), x));
             left &= !shown;
         }
     }

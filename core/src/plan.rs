@@ -58,7 +58,7 @@ impl Plan<'_> {
         (self.smooth, self.torn, self.tests) = (0, 0, 0);
         (self.strip, self.reach, self.sideless) = (Some(strip), reach, sideless);
         self.backdrop = site.backdrop();
-        let (texture, log2) = (site.bundle.texture(), site.block_log2());
+        let (texture, log2) = (site.texture, site.block_log2());
         let room = Room::new(texture.width_log2, texture.height, log2, reach);
         // The last strip may have been planned for pixels that are told from fewer texels.
         self.near = room.map_or(0, |room| room.known(self.near));

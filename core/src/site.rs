@@ -20,7 +20,7 @@ pub struct Site<'s, 'a, 'm> {
     /// Labels, screen, the source image's size.
     pub bundle: &'s Bundle<'a>,
     /// The source image.
-    pub texture: Texture<'m>,
+    pub texture: &'s Texture<'m>,
     /// The rows of nodes around the row of cells.
     pub rows: Rows<'s, 'm>,
     /// Its sheets.

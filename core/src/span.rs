@@ -54,29 +54,45 @@ pub struct Tiles<'t> {
 
 impl Tiles<'_> {
     /// Paints `out`, tiles of `PIXELS` pixels each. `window` gives the texels of that from some row on, in which `along` paints a line of pixels; `at`
-    /// paints one from anywhere in the picture.
+    /// paints one from anywhere in the picture. `by_fours`: `along` is so short that it is written out for four tiles at a time.
     #[inline(always)]
     pub fn paint<T: Copy, W: Copy, const PIXELS: usize>(
         &self,
         out: &mut [T],
+        by_fours: bool,
         window: impl Fn(u16) -> Option<W>,
         along: impl Fn(W, &mut [T; PIXELS], Line<'_>),
         at: impl Fn(PlayUv, usize) -> T,
     ) {
-        let (mut tiles, mut blocks) = (self.tiles, out.as_chunks_mut::<PIXELS>().0.iter_mut());
+        let mut blocks = out.as_chunks_mut::<PIXELS>().0;
+        // The last tile may reach past the end.
+        let mut tiles = self.tiles.get(..blocks.len()).unwrap_or(self.tiles);
         while let Some(first) = tiles.first() {
-            let (here, others) = tiles.split_at_checked(usize::from(first.run).max(1)).unwrap_or((tiles, &[]));
-            tiles = others;
+            let run = usize::from(first.run).max(1).min(tiles.len());
+            let split = tiles.split_at_checked(run).zip(core::mem::take(&mut blocks).split_at_mut_checked(run));
+            let Some(((here, others), (painted, unpainted))) = split else { return };
+            (tiles, blocks) = (others, unpainted);
             let Some(window) = window(first.row) else {
                 let [even, odd] = [0, 1].map(|x| at(self.backdrop, x));
-                for pixels in blocks.by_ref().take(here.len()).filter(|_| first.is_plain()) {
+                for pixels in painted.iter_mut().filter(|_| first.is_plain()) {
                     *pixels = core::array::from_fn(|x| if x & 1 == 0 { even } else { odd });
                 }
                 continue;
             };
-            // The last tile may reach past the end.
-            for (tile, pixels) in here.iter().zip(blocks.by_ref()) {
-                along(window, pixels, tile.row(self.row, PIXELS.trailing_zeros()));
+            let one = |tile: &Tile, pixels: &mut [T; PIXELS]| along(window, pixels, tile.row(self.row, PIXELS.trailing_zeros()));
+            // A small processor has no register left to count with: it does so once for four.
+            let ((fours, here), (four_blocks, painted)) = match by_fours && here.len() >= 4 {
+                true => (here.as_chunks::<4>(), painted.as_chunks_mut::<4>()),
+                false => ((&[][..], here), (&mut [][..], painted)),
+            };
+            for ([a, b, c, d], [e, f, g, h]) in fours.iter().zip(four_blocks) {
+                one(a, e);
+                one(b, f);
+                one(c, g);
+                one(d, h);
+            }
+            for (tile, pixels) in here.iter().zip(painted) {
+                one(tile, pixels);
             }
         }
     }

@@ -223,7 +223,7 @@ impl<C: Colours, F: Filter<Colour = C::Colour>> Paint for Lookup<C, F> {
 /// Colours of a byte a texel.
 #[derive(Debug)]
 pub struct Colours8<'t, C = u16> {
-    texture: Texture<'t>,
+    texture: &'t Texture<'t>,
     palette: &'t [C; 256],
 }
 
@@ -239,7 +239,7 @@ impl<C: Copy + Default> Colours for Colours8<'_, C> {
     const SHORT: bool = true;
 
     fn texture(&self) -> &Texture<'_> {
-        &self.texture
+        self.texture
     }
 
     #[inline(always)]
@@ -285,9 +285,11 @@ fn paint<C: Colours, F: Filter<Colour = C::Colour>, W: Copy, const WIDTH: u32, c
     let along = |window: W, pixels: &mut [u16], line: Line<'_>| {
         filter.along(pixels, line, |at: Packed<WIDTH, ROWS>| filter.packed(at, |index| colour(window, index)));
     };
+    // Pictures wider than 512 texels are rare.
+    let by_fours = F::SHORT && C::SHORT && WIDTH <= 9;
     match tiles.log2 {
-        3 => tiles.paint::<_, W, 8>(out, window, |window, pixels, line| along(window, pixels, line), at),
-        _ => tiles.paint::<_, W, 4>(out, window, |window, pixels, line| along(window, pixels, line), at),
+        3 => tiles.paint::<_, W, 8>(out, by_fours, window, |window, pixels, line| along(window, pixels, line), at),
+        _ => tiles.paint::<_, W, 4>(out, false, window, |window, pixels, line| along(window, pixels, line), at),
     }
 }
 
@@ -333,7 +335,7 @@ impl Kind for Indexed8 {
 /// Colours of half a byte a texel.
 #[derive(Debug)]
 pub struct Colours4<'t> {
-    texture: Texture<'t>,
+    texture: &'t Texture<'t>,
     palette: &'t [u16; 16],
 }
 
@@ -366,7 +368,7 @@ impl Colours for Colours4<'_> {
     const SHORT: bool = true;
 
     fn texture(&self) -> &Texture<'_> {
-        &self.texture
+        self.texture
     }
 
     #[inline(always)]
@@ -411,7 +413,7 @@ impl Kind for Indexed4 {
 /// Texels that are colours.
 #[derive(Debug)]
 pub struct ColoursDirect<'t> {
-    texture: Texture<'t>,
+    texture: &'t Texture<'t>,
     swapped: bool,
 }
 
@@ -427,7 +429,7 @@ impl Colours for ColoursDirect<'_> {
     const SHORT: bool = true;
 
     fn texture(&self) -> &Texture<'_> {
-        &self.texture
+        self.texture
     }
 
     #[inline(always)]

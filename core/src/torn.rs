@@ -201,8 +201,8 @@ pub fn share(
                 let near = Shown::from_bits(negative(axis, edge.at, edge.reach(), log2));
                 shown = if edge.upper { shown.and(near) } else { shown.and_not(near) };
             });
-            if chart.masked() && shown != Shown::NONE && !chart.fills(&bounds, &site.texture) {
-                shown = Shown::from_bits(masked(shown, &patch, log2, &site.texture));
+            if chart.masked() && shown != Shown::NONE && !chart.fills(&bounds, site.texture) {
+                shown = Shown::from_bits(masked(shown, &patch, log2, site.texture));
             }
         }
         share.sheets = share.sheets.wrapping_add(1);
@@ -300,7 +300,7 @@ pub fn candidates(site: &Site<'_, '_, '_>, offset: [u32; 2], sheets: &[Sheet]) -
             let bounds = site.block(sheet, offset).bounds();
             let chart = match chart.misses(&bounds) {
                 true => Cover::Nothing,
-                false if chart.fills(&bounds, &site.texture) => Cover::All,
+                false if chart.fills(&bounds, site.texture) => Cover::All,
                 false => Cover::Part,
             };
             cover = cover.and(chart);
