@@ -124,11 +124,15 @@ fn lay_out<L: Fn(u8) -> LabelRecord>(setting: &Setting<'_, '_, L>, target: &mut 
 /// Marks the traces of the layers that a cell in `column` tests. Its `sheets` are in `chains`, which are sorted; of each label the one `open` is that
 /// of the cells to the left or before it, and `place` tells where each one's traces are.
 fn mark(chains: &[Chain], open: &mut [u16], place: &[u16], traces: &mut [Trace], column: u16, sheets: SheetsRef<'_>) {
-    if sheets.tests == 0 {
-        return;
-    }
-    for (index, &label) in sheets.labels.iter().enumerate() {
-        if sheets.test(index) == CHART {
+    // The last of the most sheets there can be has none.
+    let mut tests = sheets.tests;
+    for &label in sheets.labels {
+        if tests == 0 {
+            return;
+        }
+        let tested = tests & 3 != CHART;
+        tests >>= 2;
+        if !tested {
             continue;
         }
         let Some(open) = open.get_mut(usize::from(label)) else { continue };
@@ -191,20 +195,23 @@ impl Finding<'_> {
     #[inline(always)]
     fn take(&mut self, cells: Range<u16>, sheets: SheetsRef<'_>) {
         let end = cells.end.wrapping_add(1);
-        for (index, &label) in sheets.labels.iter().enumerate() {
+        let mut tests = sheets.tests;
+        for &label in sheets.labels {
+            let tested = tests & 3 != CHART;
+            tests >>= 2;
             let Some(open) = self.open.get_mut(usize::from(label)) else { continue };
-            let tested = sheets.tests != 0 && sheets.test(index) != CHART;
-            let positions = !(self.backdrop && label == 0);
+            let (backdrop, room) = (self.backdrop, self.room);
+            let less = |nodes: u16| less(room, nodes, !(backdrop && label == 0));
             let known = self.chains.get_mut(usize::from(*open)).filter(|chain| chain.end >= cells.start);
             let chain = if let Some(chain) = known {
                 // Most cells list what others around them do.
                 if chain.end < end {
-                    let Some(left) = less(self.room, end.wrapping_sub(chain.end), positions) else { continue };
+                    let Some(left) = less(end.wrapping_sub(chain.end)) else { continue };
                     (self.room, chain.end) = (left, end);
                 }
                 chain
             } else {
-                let left = less(self.room, end.wrapping_sub(cells.start), positions);
+                let left = less(end.wrapping_sub(cells.start));
                 let Some((left, chain)) = left.zip(self.chains.get_mut(self.count)) else { continue };
                 *chain = Chain { first: cells.start, end, at: 0, field: NONE, label: label.into() };
                 (self.room, *open) = (left, self.count as u16);
