@@ -172,8 +172,10 @@ pub struct AnyTexels;
 trait Colours {
     /// A colour, as filters get it.
     type Colour: Copy;
-    /// Its code is so short that loops over a few pixels are written out.
+    /// Its code is so short that loops over a few pixels are written out,
     const SHORT: bool;
+    /// and so many are drawn by it that four tiles at a time are.
+    const BY_FOURS: bool = false;
 
     /// The source image.
     fn texture(&self) -> &Texture<'_>;
@@ -223,7 +225,7 @@ impl<C: Colours, F: Filter<Colour = C::Colour>> Paint for Lookup<C, F> {
 /// Colours of a byte a texel.
 #[derive(Debug)]
 pub struct Colours8<'t, C = u16> {
-    texture: &'t Texture<'t>,
+    texture: Texture<'t>,
     palette: &'t [C; 256],
 }
 
@@ -237,9 +239,10 @@ impl<C: Copy + Default> Colours8<'_, C> {
 impl<C: Copy + Default> Colours for Colours8<'_, C> {
     type Colour = C;
     const SHORT: bool = true;
+    const BY_FOURS: bool = true;
 
     fn texture(&self) -> &Texture<'_> {
-        self.texture
+        &self.texture
     }
 
     #[inline(always)]
@@ -286,7 +289,7 @@ fn paint<C: Colours, F: Filter<Colour = C::Colour>, W: Copy, const WIDTH: u32, c
         filter.along(pixels, line, |at: Packed<WIDTH, ROWS>| filter.packed(at, |index| colour(window, index)));
     };
     // Pictures wider than 512 texels are rare.
-    let by_fours = F::SHORT && C::SHORT && WIDTH <= 9;
+    let by_fours = F::SHORT && C::BY_FOURS && WIDTH <= 9;
     match tiles.log2 {
         3 => tiles.paint::<_, W, 8>(out, by_fours, window, |window, pixels, line| along(window, pixels, line), at),
         _ => tiles.paint::<_, W, 4>(out, false, window, |window, pixels, line| along(window, pixels, line), at),
@@ -305,7 +308,7 @@ impl Kind for Spread8 {
 
     #[inline(always)]
     fn colours(look: Look<'_>) -> Option<Colours8<'_, u32>> {
-        Some(Colours8 { texture: look.texture, palette: look.spread.try_into().ok()? })
+        Some(Colours8 { texture: *look.texture, palette: look.spread.try_into().ok()? })
     }
 
     fn unpack(kind: TexelKind, bits: &mut Decoder<'_>, scratch: Scratch<'_>, picture: &mut Picture<'_>) {
@@ -324,7 +327,7 @@ impl Kind for Indexed8 {
 
     #[inline(always)]
     fn colours(look: Look<'_>) -> Option<Colours8<'_>> {
-        Some(Colours8 { texture: look.texture, palette: look.palette.try_into().ok()? })
+        Some(Colours8 { texture: *look.texture, palette: look.palette.try_into().ok()? })
     }
 
     fn unpack(_: TexelKind, bits: &mut Decoder<'_>, scratch: Scratch<'_>, picture: &mut Picture<'_>) {
@@ -335,7 +338,7 @@ impl Kind for Indexed8 {
 /// Colours of half a byte a texel.
 #[derive(Debug)]
 pub struct Colours4<'t> {
-    texture: &'t Texture<'t>,
+    texture: Texture<'t>,
     palette: &'t [u16; 16],
 }
 
@@ -368,7 +371,7 @@ impl Colours for Colours4<'_> {
     const SHORT: bool = true;
 
     fn texture(&self) -> &Texture<'_> {
-        self.texture
+        &self.texture
     }
 
     #[inline(always)]
@@ -402,7 +405,7 @@ impl Kind for Indexed4 {
 
     #[inline(always)]
     fn colours(look: Look<'_>) -> Option<Colours4<'_>> {
-        Some(Colours4 { texture: look.texture, palette: look.palette.try_into().ok()? })
+        Some(Colours4 { texture: *look.texture, palette: look.palette.try_into().ok()? })
     }
 
     fn unpack(_: TexelKind, bits: &mut Decoder<'_>, scratch: Scratch<'_>, picture: &mut Picture<'_>) {
@@ -413,7 +416,7 @@ impl Kind for Indexed4 {
 /// Texels that are colours.
 #[derive(Debug)]
 pub struct ColoursDirect<'t> {
-    texture: &'t Texture<'t>,
+    texture: Texture<'t>,
     swapped: bool,
 }
 
@@ -429,7 +432,7 @@ impl Colours for ColoursDirect<'_> {
     const SHORT: bool = true;
 
     fn texture(&self) -> &Texture<'_> {
-        self.texture
+        &self.texture
     }
 
     #[inline(always)]
@@ -471,7 +474,7 @@ impl Kind for Direct565 {
 
     #[inline(always)]
     fn colours(look: Look<'_>) -> Option<ColoursDirect<'_>> {
-        Some(ColoursDirect { texture: look.texture, swapped: look.swapped })
+        Some(ColoursDirect { texture: *look.texture, swapped: look.swapped })
     }
 
     fn unpack(_: TexelKind, bits: &mut Decoder<'_>, scratch: Scratch<'_>, picture: &mut Picture<'_>) {
