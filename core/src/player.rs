@@ -149,7 +149,7 @@ impl<'a, T: Texels> Player<'a, T> {
     }
 
     /// Like [`Player::row`], with texels dithered: positions are moved by up to 3/8 of a texel, in a pattern of two by two pixels, which from some
-    /// way off looks as [`Player::bilinear_row`] does. Two to three instructions a pixel more than `row`.
+    /// way off looks as [`Player::bilinear_row`] does. One to four instructions a pixel more than `row`.
     #[inline]
     pub fn dithered_row(&mut self, y: u32, out: &mut [u16]) {
         T::dithered_row(&mut self.playing, y, out);

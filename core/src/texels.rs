@@ -172,9 +172,9 @@ pub struct AnyTexels;
 trait Colours {
     /// A colour, as filters get it.
     type Colour: Copy;
-    /// Its code is so short that loops over a few pixels are written out,
+    /// Its code is so short that loops over a few pixels are written out.
     const SHORT: bool;
-    /// and so many are drawn by it that four tiles at a time are.
+    /// Most bundles are of it: where filters are short too, tiles are drawn four at a time.
     const BY_FOURS: bool = false;
 
     /// The source image.
