@@ -2,7 +2,6 @@
 //! The plan is in the caller's memory; pixels go to the caller's row, as `player` asks. What fits no plan is drawn pixel by pixel.
 
 use crate::Bundle;
-use crate::atlas::Texture;
 use crate::fixed::PlayUv;
 use crate::form::Form;
 use crate::key::BACKDROP;
@@ -86,14 +85,14 @@ pub struct Drawing<'d, 'a> {
 }
 
 impl<'d, 'a> Drawing<'d, 'a> {
-    /// The row of cells that `space` holds, the source image, the palette, and what is spread of it.
-    pub fn new(bundle: &'d Bundle<'a>, space: &'d mut Workspace<'a>) -> (Self, (&'d Texture<'a>, &'d [u16], &'d [u32]))
+    /// The row of cells that `space` holds, the palette, and what is spread of it.
+    pub fn new(bundle: &'d Bundle<'a>, space: &'d mut Workspace<'a>) -> (Self, (&'d [u16], &'d [u32]))
     where
         'a: 'd,
     {
         let Workspace { texture, rows: [top, bottom, _], sheets, charts, plan, palette, spread, backdrop, .. } = space;
         let site = Site { bundle, texture, rows: [top, bottom], sheets, charts, backdrop: backdrop.as_ref() };
-        (Self { site, plan }, (texture, palette, spread))
+        (Self { site, plan }, (palette, spread))
     }
 
     /// Draws pixel row `y`, which lies in the row of cells.

@@ -47,6 +47,17 @@ impl SheetsRef<'_> {
         // Wider than the tests: the last of MAX_SHEETS sheets has none, and must not come by the first one's.
         ((self.tests as u32).wrapping_shr((index as u32).wrapping_mul(2)) & 3) as u16
     }
+
+    /// The labels, front to back, each with whether its fields are tested.
+    #[inline(always)]
+    pub fn tested(self) -> impl Iterator<Item = (u8, bool)> {
+        let mut tests = self.tests;
+        self.labels.iter().map(move |&label| {
+            let test = tests & 3;
+            tests >>= 2;
+            (label, test != CHART)
+        })
+    }
 }
 
 /// Labels tried by their place in the neighbourhood before one is coded as a number.

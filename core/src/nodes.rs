@@ -9,7 +9,7 @@ use crate::coder::{Bits, Probability};
 use crate::field;
 use crate::format::LabelRecord;
 use crate::key::{BACKDROP, Chain, Key, NONE, Setting, Source};
-use crate::lists::{CHART, Cursor, Lists, SheetsRef};
+use crate::lists::{Cursor, Lists, SheetsRef};
 use crate::predict;
 pub use crate::predict::Trace;
 use core::ops::Range;
@@ -124,17 +124,10 @@ fn lay_out<L: Fn(u8) -> LabelRecord>(setting: &Setting<'_, '_, L>, target: &mut 
 /// Marks the traces of the layers that a cell in `column` tests. Its `sheets` are in `chains`, which are sorted; of each label the one `open` is that
 /// of the cells to the left or before it, and `place` tells where each one's traces are.
 fn mark(chains: &[Chain], open: &mut [u16], place: &[u16], traces: &mut [Trace], column: u16, sheets: SheetsRef<'_>) {
-    // The last of the most sheets there can be has none.
-    let mut tests = sheets.tests;
-    for &label in sheets.labels {
-        if tests == 0 {
-            return;
-        }
-        let tested = tests & 3 != CHART;
-        tests >>= 2;
-        if !tested {
-            continue;
-        }
+    if sheets.tests == 0 {
+        return;
+    }
+    for (label, _) in sheets.tested().filter(|&(_, tested)| tested) {
         let Some(open) = open.get_mut(usize::from(label)) else { continue };
         while let Some(chain) = chains.get(usize::from(*open))
             && chain.label == u16::from(label)
@@ -195,10 +188,7 @@ impl Finding<'_> {
     #[inline(always)]
     fn take(&mut self, cells: Range<u16>, sheets: SheetsRef<'_>) {
         let end = cells.end.wrapping_add(1);
-        let mut tests = sheets.tests;
-        for &label in sheets.labels {
-            let tested = tests & 3 != CHART;
-            tests >>= 2;
+        for (label, tested) in sheets.tested() {
             let Some(open) = self.open.get_mut(usize::from(label)) else { continue };
             let (backdrop, room) = (self.backdrop, self.room);
             let less = |nodes: u16| less(room, nodes, !(backdrop && label == 0));

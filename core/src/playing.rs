@@ -102,7 +102,7 @@ pub struct Look<'t> {
     /// What a texel is.
     pub kind: TexelKind,
     /// The source image.
-    pub texture: &'t Texture<'t>,
+    pub texture: Texture<'t>,
     /// Its palette in the display's byte order, as many entries as the kind can have.
     pub palette: &'t [u16],
     /// The same as means are made of it, where that was asked for.
@@ -239,8 +239,8 @@ impl<'a> Playing<'a> {
         if !self.ready(y) {
             return None;
         }
-        let (kind, swapped) = (self.bundle.texel_kind(), self.swapped);
-        let (drawing, (texture, palette, spread)) = Drawing::new(self.bundle, &mut self.space);
+        let (kind, texture, swapped) = (self.bundle.texel_kind(), self.space.texture, self.swapped);
+        let (drawing, (palette, spread)) = Drawing::new(self.bundle, &mut self.space);
         Some((drawing, &mut self.work, Look { kind, texture, palette, spread, swapped }))
     }
 

@@ -308,7 +308,7 @@ impl Kind for Spread8 {
 
     #[inline(always)]
     fn colours(look: Look<'_>) -> Option<Colours8<'_, u32>> {
-        Some(Colours8 { texture: *look.texture, palette: look.spread.try_into().ok()? })
+        Some(Colours8 { texture: look.texture, palette: look.spread.try_into().ok()? })
     }
 
     fn unpack(kind: TexelKind, bits: &mut Decoder<'_>, scratch: Scratch<'_>, picture: &mut Picture<'_>) {
@@ -327,7 +327,7 @@ impl Kind for Indexed8 {
 
     #[inline(always)]
     fn colours(look: Look<'_>) -> Option<Colours8<'_>> {
-        Some(Colours8 { texture: *look.texture, palette: look.palette.try_into().ok()? })
+        Some(Colours8 { texture: look.texture, palette: look.palette.try_into().ok()? })
     }
 
     fn unpack(_: TexelKind, bits: &mut Decoder<'_>, scratch: Scratch<'_>, picture: &mut Picture<'_>) {
@@ -405,7 +405,7 @@ impl Kind for Indexed4 {
 
     #[inline(always)]
     fn colours(look: Look<'_>) -> Option<Colours4<'_>> {
-        Some(Colours4 { texture: *look.texture, palette: look.palette.try_into().ok()? })
+        Some(Colours4 { texture: look.texture, palette: look.palette.try_into().ok()? })
     }
 
     fn unpack(_: TexelKind, bits: &mut Decoder<'_>, scratch: Scratch<'_>, picture: &mut Picture<'_>) {
@@ -474,7 +474,7 @@ impl Kind for Direct565 {
 
     #[inline(always)]
     fn colours(look: Look<'_>) -> Option<ColoursDirect<'_>> {
-        Some(ColoursDirect { texture: *look.texture, swapped: look.swapped })
+        Some(ColoursDirect { texture: look.texture, swapped: look.swapped })
     }
 
     fn unpack(_: TexelKind, bits: &mut Decoder<'_>, scratch: Scratch<'_>, picture: &mut Picture<'_>) {
