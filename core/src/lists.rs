@@ -48,14 +48,14 @@ impl SheetsRef<'_> {
         ((self.tests as u32).wrapping_shr((index as u32).wrapping_mul(2)) & 3) as u16
     }
 
-    /// The labels, front to back, each with whether its fields are tested.
+    /// The labels, front to back, each with its test. Past the tests there is nothing but [`CHART`]: the last of `MAX_SHEETS` sheets has none.
     #[inline(always)]
-    pub fn tested(self) -> impl Iterator<Item = (u8, bool)> {
+    pub fn each(self) -> impl Iterator<Item = (u8, u16)> {
         let mut tests = self.tests;
         self.labels.iter().map(move |&label| {
             let test = tests & 3;
             tests >>= 2;
-            (label, test != CHART)
+            (label, test)
         })
     }
 }

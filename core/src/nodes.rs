@@ -9,7 +9,7 @@ use crate::coder::{Bits, Probability};
 use crate::field;
 use crate::format::LabelRecord;
 use crate::key::{BACKDROP, Chain, Key, NONE, Setting, Source};
-use crate::lists::{Cursor, Lists, SheetsRef};
+use crate::lists::{CHART, Cursor, Lists, SheetsRef};
 use crate::predict;
 pub use crate::predict::Trace;
 use core::ops::Range;
@@ -127,7 +127,7 @@ fn mark(chains: &[Chain], open: &mut [u16], place: &[u16], traces: &mut [Trace],
     if sheets.tests == 0 {
         return;
     }
-    for (label, _) in sheets.tested().filter(|&(_, tested)| tested) {
+    for (label, _) in sheets.each().filter(|&(_, test)| test != CHART) {
         let Some(open) = open.get_mut(usize::from(label)) else { continue };
         while let Some(chain) = chains.get(usize::from(*open))
             && chain.label == u16::from(label)
@@ -188,7 +188,7 @@ impl Finding<'_> {
     #[inline(always)]
     fn take(&mut self, cells: Range<u16>, sheets: SheetsRef<'_>) {
         let end = cells.end.wrapping_add(1);
-        for (label, tested) in sheets.tested() {
+        for (label, test) in sheets.each() {
             let Some(open) = self.open.get_mut(usize::from(label)) else { continue };
             let (backdrop, room) = (self.backdrop, self.room);
             let less = |nodes: u16| less(room, nodes, !(backdrop && label == 0));
@@ -208,7 +208,7 @@ impl Finding<'_> {
                 self.count = self.count.wrapping_add(1);
                 chain
             };
-            if tested {
+            if test != CHART {
                 chain.field = 0;
                 self.tested = true;
             }

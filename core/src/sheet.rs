@@ -103,10 +103,8 @@ impl RowSheets<'_> {
         for stretch in self.stretch.iter_mut() {
             let Some(left) = grid.columns.checked_sub(column).filter(|&left| left > 0) else { break };
             let listed = lists.sheets(cursor);
-            let (first, mut tests, mut end) = (count, u32::from(listed.tests), 0);
-            for &label in listed.labels {
-                let test = tests as u8 & 3;
-                tests >>= 2;
+            let (first, mut end) = (count, 0);
+            for (label, test) in listed.each() {
                 let Some((known, slot)) = self.found.get_mut(usize::from(label)).zip(self.sheet.get_mut(count)) else { continue };
                 // Columns ascend: what was found for one to the left holds up to where one of its chains ends.
                 if column >= usize::from(known.end) {
@@ -114,7 +112,7 @@ impl RowSheets<'_> {
                     *known = found;
                 }
                 end = known.end;
-                *slot = Sheet { nodes: known.nodes, label, test }.further((column as u16).wrapping_sub(known.column));
+                *slot = Sheet { nodes: known.nodes, label, test: test as u8 }.further((column as u16).wrapping_sub(known.column));
                 count = count.wrapping_add(1);
             }
             cursor = cursor.next(lists);
