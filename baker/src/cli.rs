@@ -109,10 +109,10 @@ pub struct Bake {
     /// What detail is worth, 0.001 to 100 bytes, or all: more keeps more texels, in a larger source image [default: 0.03].
     ///
     /// A chart gets fewer texels than --density asks where they take more bytes than what they show is worth: this much for each pixel of each frame
-    /// whose texel is twice as long as the pixel, four times as much for four times as long; a path counts 128 frames more than it has. All keeps
-    /// --density in every chart: bundles of models take half to two thirds as many bytes again, a room or a street more than twice as many, for up to
-    /// 1.3 dB. With 0.1 models took 15 to 37 % more, for .1 to .6 dB (with softened outlines .2 to .8). A scene that brings a flattening of its own, as
-    /// built-in ones do, keeps its texels. With --budget the search may keep all, unless this is given.
+    /// whose colour is eight levels of 255 off since its texel is longer than the pixel, four times as much for sixteen levels; an eighth of it whose texel
+    /// is twice as long, whatever its colour; a path counts 128 frames more than it has. So plain walls get few texels, and print on them many. All keeps
+    /// --density in every chart: XXX. A scene that brings a flattening of its own, as built-in ones do,
+    /// keeps its texels. With --budget the search may keep all, unless this is given.
     #[arg(long, value_name = "WORTH")]
     pub detail: Option<Detail>,
     /// What a texel of the source image is, and so what it costs.

@@ -84,8 +84,9 @@ pub struct Settings {
     pub max_side: u32,
     /// Texels a pixel, at most, where a chart is seen closest.
     pub density: f64,
-    /// What detail is worth, bytes: charts that few pixels see closely get fewer texels. For each pixel of each frame, times the square of the
-    /// octaves that its texel is longer than the pixel; a path counts [`LONGER`] frames more than it has. Infinite: all charts have `density`.
+    /// What detail is worth, bytes: charts that few pixels see closely, or that show little detail, get fewer texels. For each pixel of each frame whose
+    /// colour is eight levels of 255 off since its texel is longer than the pixel, four times as much where it is sixteen off; a path counts [`LONGER`]
+    /// frames more than it has. Infinite: all charts have `density`.
     pub detail: f64,
     /// What a texel is.
     pub texels: TexelKind,

@@ -175,9 +175,9 @@ impl Packing<'_> {
         let levels: Vec<Items> = masks.iter().map(|masks| Items::new(self.backdrop, masks)).collect();
         // A texel more is worth more where more pixels see the chart, and where they could see more of it: as the charting weighs them.
         let worth = |i: usize, level: usize| {
-            let Chart { density, finest, hits, .. } = &charts[i - 1];
+            let Chart { density, finest, loss, hits, .. } = &charts[i - 1];
             let missing = libm::log2(finest / (density * scales[level])).max(0.0);
-            *hits as f64 * missing / f64::from(levels[level].shapes[i][0].area.max(1))
+            *hits as f64 * loss * missing / f64::from(levels[level].shapes[i][0].area.max(1))
         };
         let growing = Growing { levels: &levels, size, apart: [NARROW[0], rim], steps: items.steps(size) };
         let (of, laid) = growing.grown(laid, worth);

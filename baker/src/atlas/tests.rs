@@ -366,6 +366,11 @@ fn detail_takes_the_texels_that_it_is_worth() {
     // Texels of two bytes have to show more, those of half a byte less.
     let [four, direct] = [TexelKind::Indexed4, TexelKind::Direct565].map(|kind| texels(&scene, 0.03, kind));
     assert!(four > usual && usual > direct, "{four} {usual} {direct}");
+    // What is of one colour, or nearly, shows as much with fewer.
+    let mut plain = cube();
+    plain.materials[0].texture = None;
+    let plain = texels(&plain, 0.03, TexelKind::Indexed8);
+    assert!(2 * plain < usual, "{plain} {usual}");
 }
 
 #[test]

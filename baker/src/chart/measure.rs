@@ -1,7 +1,8 @@
 //! Measuring of charts: how dense they have to be, which way they lie best, how far they reach.
 //! Samples come from the G-buffer; the figures go to `fold` and to the packing.
 
-use super::{Chart, Charting, Density, Projection};
+use super::blur::{Loss, Seen};
+use super::{COARSER, Chart, Charting, Density, Projection};
 use crate::gbuffer::{BACKGROUND, Hits, Lens};
 use crate::scene::Scene;
 use glam::DVec3;
@@ -9,8 +10,6 @@ use rayon::prelude::*;
 
 /// The share of a chart's pixels that is shown at the density asked for, at most: one close-up must not blow up the rest.
 const SHARE: f64 = 0.9;
-/// Octaves that a chart may be coarser, at most, for what its texels take.
-const COARSER: usize = 3;
 /// The share of a source image that charts fill.
 const FILL: f64 = 0.7;
 /// Directions tried over half a turn for the chart's smallest rectangle.
@@ -71,25 +70,21 @@ impl Figures {
     }
 
     /// Texels a unit that are worth their bytes in a chart whose faces cover `area` square units: no more than most pixels ask for.
-    fn density(&self, area: f64, wanted: &Density) -> f64 {
+    fn density(&self, area: f64, wanted: &Density, loss: &Loss) -> f64 {
         let closest = self.closest();
-        if wanted.detail.is_infinite() {
-            return closest;
-        }
+        // Each step's cost to a pixel.
+        let blurred: Vec<f64> = (0..BINS).map(|steps| loss.of(steps as f64 / OCTAVE as f64)).collect();
         let cost = |density: f64| {
-            let at = bin(density);
-            // Octaves that texels are too long, squared, pixel by pixel.
-            let blurred =
-                self.densities.iter().enumerate().skip(at).map(|(i, &n)| f64::from(n) * ((i - at) as f64 / OCTAVE as f64).powi(2));
-            area / FILL * density * density * wanted.texel + wanted.detail * blurred.sum::<f64>()
+            let lost = self.densities.iter().skip(bin(density)).zip(&blurred).map(|(&n, blurred)| f64::from(n) * blurred);
+            area / FILL * density * density * wanted.texel + wanted.detail * lost.sum::<f64>()
         };
         let coarser = (0..=COARSER * OCTAVE).map(|steps| closest * libm::exp2(-(steps as f64) / OCTAVE as f64));
         coarser.min_by(|&a, &b| cost(a).total_cmp(&cost(b))).unwrap_or(closest)
     }
 }
 
-/// Sets every chart's axes, density and bounds.
-pub(super) fn measure(scene: &Scene, hits: &Hits, charting: &mut Charting, density: &Density, max_side: u32) {
+/// Sets every chart's axes, density and bounds. Without what is `seen`, all charts have the density that most of their pixels ask for.
+pub(super) fn measure(scene: &Scene, hits: &Hits, seen: Option<&Seen>, charting: &mut Charting, density: &Density, max_side: u32) {
     charting.flatten(scene);
     let turns: [[f64; 2]; TURNS] = std::array::from_fn(|k| {
         let angle = k as f64 * core::f64::consts::PI / TURNS as f64;
@@ -134,11 +129,19 @@ pub(super) fn measure(scene: &Scene, hits: &Hits, charting: &mut Charting, densi
         })
         .collect();
     let areas = areas(charting);
-    for (i, chart) in charting.charts.iter_mut().enumerate() {
+    let merged = |chart: usize| {
         let mut figures = Figures::new();
-        tables.iter().filter_map(|t| t[i].as_ref()).for_each(|f| figures.merge(f));
-        let densities = [figures.density(areas[i], density), figures.closest()].map(|of| density.most * of);
-        settle(chart, &figures, &turns, densities, max_side);
+        tables.iter().filter_map(|t| t[chart].as_ref()).for_each(|f| figures.merge(f));
+        figures
+    };
+    let figures: Vec<Figures> = (0..charting.charts.len()).map(merged).collect();
+    let closest: Vec<f64> = figures.iter().map(Figures::closest).collect();
+    let losses = seen.map(|seen| seen.losses(charting, &closest));
+    for (i, (chart, figures)) in charting.charts.iter_mut().zip(&figures).enumerate() {
+        let loss = losses.as_ref().map(|losses| &losses[i]);
+        let worth = loss.map_or(closest[i], |loss| figures.density(areas[i], density, loss));
+        chart.loss = loss.map_or(1.0, |loss| loss.of(1.0));
+        settle(chart, figures, &turns, [worth, closest[i]].map(|of| density.most * of), max_side);
     }
     charting.flatten(scene);
     snap(charting);
@@ -233,8 +236,11 @@ mod tests {
 
     #[test]
     fn texels_are_worth_what_they_show() {
+        // Of one colour: a pixel's octaves count alone, squared.
+        let plain = Loss::default();
         let of = |pixels: &[(u32, f64)], area: f64, detail: f64, texel: f64| {
-            libm::log2(seen(pixels).density(area, &Density { most: 1.0, detail, texel }))
+            let wanted = Density { most: 1.0, detail: detail / plain.of(1.0), texel };
+            libm::log2(seen(pixels).density(area, &wanted, &plain))
         };
         let about = |octaves: f64, expected: f64| assert!((octaves - expected).abs() <= 1.0 / OCTAVE as f64, "{octaves}, not {expected}");
         // All that was asked for, where detail is worth any bytes or is seen by many; no less than the coarsest, where nearly nobody does.

@@ -3,6 +3,7 @@
 
 mod absorb;
 mod apart;
+mod blur;
 mod directions;
 mod family;
 mod flat;
@@ -62,6 +63,8 @@ pub struct Chart {
     pub density: f64,
     /// The same if bytes did not matter.
     pub finest: f64,
+    /// What texels an octave too long cost a pixel that shows it, on the whole: 1 where its colour is then eight levels of 255 off.
+    pub loss: f64,
     /// Smallest flattened coordinates that are seen.
     pub lo: [f64; 2],
     /// Largest flattened coordinates that are seen.
@@ -76,13 +79,16 @@ pub(crate) struct Parts {
     charts: Vec<Chart>,
 }
 
+/// Octaves that a chart may be coarser, at most, for what its texels take.
+const COARSER: usize = 3;
+
 /// How many texels charts get.
 #[derive(Clone, Copy, Debug)]
 pub struct Density {
     /// Texels a pixel, at most, where a chart is seen closest.
     pub most: f64,
-    /// What detail is worth, bytes: for each pixel of each frame, times the square of the octaves that its texel is longer than the pixel.
-    /// Infinite: all charts have `most`.
+    /// What detail is worth, bytes: for each pixel of each frame whose colour is eight levels of 255 off since its texel is longer than the pixel, four times as
+    /// much where it is sixteen off. Infinite: all charts have `most`.
     pub detail: f64,
     /// What a texel takes, bytes.
     pub texel: f64,
@@ -262,6 +268,7 @@ pub fn build(scene: &Scene, hits: &Hits, family: Family, density: &Density, max_
             candidates.push(clusters);
         }
     }
+    let seen = density.detail.is_finite().then(|| blur::Seen::new(scene, hits));
     let mut charting = Charting { charts: Vec::new(), chart_of: Vec::new(), corners: Vec::new(), warps: Vec::new(), faces };
     let mut best: Option<(f64, Vec<u32>, Vec<Chart>)> = None;
     for clusters in candidates {
@@ -269,13 +276,14 @@ pub fn build(scene: &Scene, hits: &Hits, family: Family, density: &Density, max_
             projection: view.projection(depth),
             density: density.most,
             finest: density.most,
+            loss: 1.0,
             lo: [0.0; 2],
             hi: [0.0; 2],
             hits: 0,
         };
         charting.charts = clusters.views.iter().zip(charting.depths(&clusters)).map(chart).collect();
         charting.chart_of = clusters.of;
-        measure::measure(scene, hits, &mut charting, density, max_side);
+        measure::measure(scene, hits, seen.as_ref(), &mut charting, density, max_side);
         let price = price::price(hits, &charting);
         if best.as_ref().is_none_or(|b| price < b.0) {
             best = Some((price, std::mem::take(&mut charting.chart_of), std::mem::take(&mut charting.charts)));
@@ -286,12 +294,12 @@ pub fn build(scene: &Scene, hits: &Hits, family: Family, density: &Density, max_
     }
     if let Some(islands) = islands {
         islands.take(scene, &mut charting);
-        measure::measure(scene, hits, &mut charting, density, max_side);
+        measure::measure(scene, hits, seen.as_ref(), &mut charting, density, max_side);
     }
     charting.flatten(scene);
     let (folded, parted) = (fold::split(hits, &mut charting, &links), apart::split(scene, hits, &mut charting, &links));
     if folded || parted {
-        measure::measure(scene, hits, &mut charting, density, max_side);
+        measure::measure(scene, hits, seen.as_ref(), &mut charting, density, max_side);
     }
     charting
 }
