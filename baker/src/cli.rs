@@ -111,8 +111,9 @@ pub struct Bake {
     /// A chart gets fewer texels than --density asks where they take more bytes than what they show is worth: this much for each pixel of each frame
     /// whose colour is eight levels of 255 off since its texel is longer than the pixel, four times as much for sixteen levels; an eighth of it whose texel
     /// is twice as long, whatever its colour; a path counts 128 frames more than it has. So plain walls get few texels, and print on them many. All keeps
-    /// --density in every chart: XXX. A scene that brings a flattening of its own, as built-in ones do,
-    /// keeps its texels. With --budget the search may keep all, unless this is given.
+    /// --density in every chart: bundles of models take a third to a half as many bytes again, those of a street or a room three times as many, for .2 to
+    /// 1.3 dB. With 0.1 a model took a third more, for .9 dB (with softened outlines 1.3), a street too, for .3, and a room four fifths, for .1. A scene that
+    /// brings a flattening of its own, as built-in ones do, keeps its texels. With --budget the search may keep all, unless this is given.
     #[arg(long, value_name = "WORTH")]
     pub detail: Option<Detail>,
     /// What a texel of the source image is, and so what it costs.
