@@ -8,8 +8,10 @@ use crate::shade::Shader;
 use crate::truth::spread;
 use rayon::prelude::*;
 
-/// Frames looked at, evenly spread.
-const FRAMES: u32 = 16;
+/// Frames looked at, evenly spread: so many,
+const FRAMES: usize = 16;
+/// or fewer of large ones, down to a quarter, for that many pixels.
+const PIXELS: usize = 4 << 20;
 /// What a pixel counts beside its colour, whatever that is, squared levels an octave squared: outlines are of texels too.
 const OUTLINE: f64 = 8.0;
 /// Bits of a texel's column and row.
@@ -32,7 +34,8 @@ impl Seen {
             };
             samples.map(coloured).collect::<Vec<_>>()
         };
-        Self(spread(hits.frames, FRAMES).into_par_iter().flat_map_iter(of).collect())
+        let most = (PIXELS / size.max(1)).clamp(FRAMES / 4, FRAMES);
+        Self(spread(hits.frames, most as u32).into_par_iter().flat_map_iter(of).collect())
     }
 
     /// What longer texels lose in each chart, counted from those of such `densities`.
