@@ -200,7 +200,7 @@ mod tests {
         let hits = Hits::cast(&scene, &Tracer::new(&scene), &|_, _| {});
         let (faces, links) = observe::observe(&scene, &hits, true);
         let projection = Projection::Plane([DVec3::X, DVec3::Y, DVec3::Z]);
-        let charts = vec![Chart { projection, density: 1.0, finest: 1.0, loss: 1.0, lo: [0.0; 2], hi: [0.0; 2], hits: 0 }];
+        let charts = vec![Chart::new(projection, 1.0)];
         let chart_of = vec![0; faces.list.len()];
         let mut charting = Charting { faces, chart_of, corners: Vec::new(), charts, warps: Vec::new() };
         let cut = split(&scene, &hits, &mut charting, &links);

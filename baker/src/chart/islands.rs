@@ -23,15 +23,7 @@ pub(super) fn build(scene: &Scene, hits: &Hits, faces: Faces) -> Charting {
             let number = &mut number[usize::from(island)];
             if *number == NONE {
                 *number = charts.len() as u32;
-                charts.push(Chart {
-                    projection: Projection::Texture,
-                    density: 1.0,
-                    finest: 1.0,
-                    loss: 1.0,
-                    lo: [0.0; 2],
-                    hi: [0.0; 2],
-                    hits: 0,
-                });
+                charts.push(Chart::new(Projection::Texture, 1.0));
             }
             *number
         })

@@ -73,6 +73,13 @@ pub struct Chart {
     pub hits: u64,
 }
 
+impl Chart {
+    /// One that is not measured yet: of nothing seen, as fine as it gets.
+    pub(crate) const fn new(projection: Projection, density: f64) -> Self {
+        Self { projection, density, finest: density, loss: 1.0, lo: [0.0; 2], hi: [0.0; 2], hits: 0 }
+    }
+}
+
 /// How the faces are shared out among charts: what a cut changes.
 pub(crate) struct Parts {
     chart_of: Vec<u32>,
@@ -272,15 +279,7 @@ pub fn build(scene: &Scene, hits: &Hits, family: Family, density: &Density, max_
     let mut charting = Charting { charts: Vec::new(), chart_of: Vec::new(), corners: Vec::new(), warps: Vec::new(), faces };
     let mut best: Option<(f64, Vec<u32>, Vec<Chart>)> = None;
     for clusters in candidates {
-        let chart = |(view, depth): (&View, f64)| Chart {
-            projection: view.projection(depth),
-            density: density.most,
-            finest: density.most,
-            loss: 1.0,
-            lo: [0.0; 2],
-            hi: [0.0; 2],
-            hits: 0,
-        };
+        let chart = |(view, depth): (&View, f64)| Chart::new(view.projection(depth), density.most);
         charting.charts = clusters.views.iter().zip(charting.depths(&clusters)).map(chart).collect();
         charting.chart_of = clusters.of;
         measure::measure(scene, hits, seen.as_ref(), &mut charting, density, max_side);

@@ -119,7 +119,7 @@ impl Islands {
                 (&mut kept[old], charting.charts[old].clone())
             } else {
                 let projection = Projection::Unwrapped([[1.0, 0.0], [0.0, 1.0]]);
-                let chart = Chart { projection, density: 1.0, finest: 1.0, loss: 1.0, lo: [0.0; 2], hi: [0.0; 2], hits: 0 };
+                let chart = Chart::new(projection, 1.0);
                 (&mut number[(2 * island + (face.surface & 1)) as usize], chart)
             };
             if *number == NONE {
