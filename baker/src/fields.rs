@@ -1,6 +1,6 @@
 //! Fields: signed distances on the screen from a sheet's outline, positive where the sheet shows; one number a layer,
 //! interpolated like a position. They tell curved silhouettes, where the chart goes on beyond what is seen.
-//! Fitted to the G-buffer like positions are; `order` decides where they are used.
+//! Fitted to the G-buffer like positions are, for `settle`; `order` decides where they are used.
 //!
 //! Things thinner than a few cells are *strips*: two fields, the distances from two opposite sides, both positive inside.
 
@@ -54,7 +54,15 @@ pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers
 }
 
 impl Fields {
-    /// Fits the fields once more, now that the tests are chosen: where charts tell, fields need not.
+    /// Fits fields anew, now that tests are chosen: those that tests ask for, and none else.
+    #[must_use]
+    pub fn tested(self, gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers) -> Self {
+        let outlines = Outlines { gbuffer, grid, sheets, layers, thin: &self.thin };
+        let first = fit::solve_for(&outlines.problem(None, true)).uv;
+        Self { distance: outlines.refit(first, true), thin: self.thin }
+    }
+
+    /// Likewise, on from what they are.
     #[must_use]
     pub fn settled(self, gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers) -> Self {
         let outlines = Outlines { gbuffer, grid, sheets, layers, thin: &self.thin };

@@ -1,6 +1,7 @@
 //! Order: the sheets of every torn cell, front to back, and the coverage test of each, such that what the player shows differs least from
 //! what is seen. A wrong sheet of nearly the right colour does little harm: of two orders that get as many pixels wrong, the one that shows
-//! it less is better. Positions come from `fit`, fields from `fields`; the ordered lists go to `encode`.
+//! it less is better. Positions come from `fit`, fields from `fields`; the ordered lists go back to
+//! `settle`.
 
 use crate::atlas::SourceImage;
 use crate::bake::Coverage;
@@ -38,8 +39,6 @@ pub struct Evidence<'a> {
     pub layers: &'a Layers,
     /// Their positions.
     pub fit: &'a Fit,
-    /// Their fields, once they are known.
-    pub fields: Option<&'a Fields>,
     /// A field has to save this many pixels in a cell and interval to be worth its bytes.
     pub field_price: u32,
     /// The tests to choose from.
@@ -53,10 +52,10 @@ type Cost = u64;
 type Candidate = (u16, Cost);
 
 impl Evidence<'_> {
-    /// The tests to choose from: before the fields are known only the chart's.
-    fn candidates(&self) -> Vec<Candidate> {
+    /// The tests to choose from: before the `fields` are known only the chart's.
+    fn candidates(&self, fields: Option<&Fields>) -> Vec<Candidate> {
         let price = Cost::from(self.field_price * PIXEL);
-        match (self.fields, self.coverage) {
+        match (fields, self.coverage) {
             (None, _) | (_, Coverage::Chart) => vec![(CHART, 0)],
             (_, Coverage::Field) => vec![(FIELD, price)],
             (_, Coverage::All) => vec![(CHART, 0), (FIELD, price), (BOTH, price)],
@@ -96,12 +95,12 @@ struct Choice {
     cost: Cost,
 }
 
-/// Sorts the sheets of every cell front to back and chooses their tests.
-pub fn sort(evidence: &Evidence<'_>, sheets: &mut Sheets) {
-    let candidates = &evidence.candidates();
+/// Sorts the sheets of every cell front to back and chooses their tests, given their `fields` once these are known.
+pub fn sort(evidence: &Evidence<'_>, fields: Option<&Fields>, sheets: &mut Sheets) {
+    let candidates = &evidence.candidates(fields);
     let torn = sheets.lists.par_iter_mut().zip(&mut sheets.tests).enumerate().filter(|(_, (list, _))| list.len() > 1);
     torn.for_each(|(index, (list, tests))| {
-        let groups = observe(evidence, index, list);
+        let groups = observe(evidence, fields, index, list);
         let choose = if list.len() <= EXHAUSTIVE { best } else { greedy };
         let choice = choose(&groups, list.len(), candidates);
         *list = choice.order.iter().map(|&sheet| list[sheet]).collect();
@@ -110,8 +109,8 @@ pub fn sort(evidence: &Evidence<'_>, sheets: &mut Sheets) {
 }
 
 /// Sums up the pixels of a cell and interval by what they see and what would cover them.
-fn observe(evidence: &Evidence<'_>, index: usize, list: &[u8]) -> Vec<Group> {
-    let &Evidence { gbuffer, grid, image, layers, fit, fields, .. } = evidence;
+fn observe(evidence: &Evidence<'_>, fields: Option<&Fields>, index: usize, list: &[u8]) -> Vec<Group> {
+    let &Evidence { gbuffer, grid, image, layers, fit, .. } = evidence;
     let cells = grid.grid.cells();
     let (interval, cell) = (index / cells, index % cells);
     let patches = |ways| -> Vec<Patch> { list.iter().map(|&label| Patch::new(grid, layers, [interval, cell], label, ways)).collect() };

@@ -73,7 +73,7 @@ pub fn reason(trials: &[Trial]) -> String {
 mod tests {
     use super::*;
     use crate::atlas;
-    use crate::bake::{self, Settings};
+    use crate::bake::{self, Coverage, Settings};
     use crate::chart::Family;
     use crate::scene::builtin;
     use cubist_core::format::SPACE_LINEAR;
@@ -89,9 +89,9 @@ mod tests {
 
     #[test]
     fn what_stands_close_is_outlined_finely() {
-        // Stones seen so small that many stand in every cell.
+        // Stones seen so small that many stand in every cell, told by their charts alone.
         let source = atlas::Settings { charts: Family::Sight.into(), ..atlas::Settings::default() };
-        let settings = Settings { key_interval: 4, space: SPACE_LINEAR, atlas: source, ..Settings::default() };
+        let settings = Settings { key_interval: 4, space: SPACE_LINEAR, atlas: source, coverage: Coverage::Chart, ..Settings::default() };
         let (finer, flat, made, trials) = chosen("pivot", settings);
         assert!(trials.len() == 3 && trials.iter().map(|trial| trial.bits).eq([1, 2, 4]), "{}", reason(&trials));
         let best = trials.iter().map(Trial::worth).fold(f64::NEG_INFINITY, f64::max);

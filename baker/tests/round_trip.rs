@@ -5,7 +5,7 @@ use cubist_baker::bake::Coverage;
 use cubist_baker::encode::{self, CodingSettings, Content, Exceeded, Header};
 use cubist_baker::gbuffer::GBuffer;
 use cubist_baker::sheets::{self, KeyGrid, Layers};
-use cubist_baker::{fields, fit, order};
+use cubist_baker::{fields, fit, order, settle};
 use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC, TIME_HOLD, TIME_LINEAR, TexelKind};
 use cubist_core::{Bundle, Frame, Player};
 
@@ -54,11 +54,8 @@ fn bake_every(interval: u32, gbuffer: &GBuffer, image: &SourceImage, looping: bo
     let layers = Layers::of(&grid, &sheets);
     let fit = fit::solve(gbuffer, &grid, &sheets, &layers, &vec![None; layers.label.len()]);
     let (field_price, coverage) = (4, Coverage::All);
-    let mut evidence = order::Evidence { gbuffer, grid: &grid, image, layers: &layers, fit: &fit, fields: None, field_price, coverage };
-    order::sort(&evidence, &mut sheets);
-    let fields = fields::solve(gbuffer, &grid, &sheets, &layers, image.labels.len());
-    evidence.fields = Some(&fields);
-    order::sort(&evidence, &mut sheets);
+    let evidence = order::Evidence { gbuffer, grid: &grid, image, layers: &layers, fit: &fit, field_price, coverage };
+    let fields = settle::settle(&evidence, &mut sheets);
     let settings = CodingSettings { step_log2: 0, lambda: 0.0, independent_every };
     let content = Content { grid: &grid, image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields, planes: &[], cameras: &[] };
     encode::bundle(&content, settings, Header { storage: Storage::Raw, fps: 30, info: "two sheets" }).expect("it fits")

@@ -7,7 +7,7 @@ use cubist_baker::bake::Coverage;
 use cubist_baker::encode::{self, CodingSettings, Content, Header};
 use cubist_baker::gbuffer::GBuffer;
 use cubist_baker::sheets::{self, KeyGrid, Layers};
-use cubist_baker::{fields, fit, order};
+use cubist_baker::{fit, order, settle};
 use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC, TexelKind};
 
 /// A screen all of one label, and how it is played.
@@ -73,12 +73,10 @@ impl Synthetic {
             image: &image,
             layers: &layers,
             fit: &fit,
-            fields: None,
             field_price: 4,
             coverage: Coverage::All,
         };
-        order::sort(&evidence, &mut sheets);
-        let fields = fields::solve(&gbuffer, &grid, &sheets, &layers, image.labels.len());
+        let fields = settle::settle(&evidence, &mut sheets);
         let settings = CodingSettings { step_log2: 0, lambda: 0.0, independent_every: self.independent_every };
         let content =
             Content { grid: &grid, image: &image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields, planes: &[], cameras: &[] };
