@@ -1,7 +1,6 @@
 //! Order: the sheets of every torn cell, front to back, and the coverage test of each, such that what the player shows differs least from
 //! what is seen. A wrong sheet of nearly the right colour does little harm: of two orders that get as many pixels wrong, the one that shows
-//! it less is better. Positions come from `fit`, fields from `fields`; the ordered lists go back to
-//! `settle`.
+//! it less is better. Positions come from `fit`, fields from `fields`; the ordered lists go back to `settle`.
 
 use crate::atlas::SourceImage;
 use crate::bake::Coverage;

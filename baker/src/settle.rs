@@ -8,7 +8,7 @@ use crate::polish;
 use crate::sheets::Sheets;
 
 /// Turns that go on from the fields of the last one. On fast paths around five models and through streets all turns but the first made .1 to .8 dB beside
-/// the antialiased truth with softened outlines, for half as much time for fitting again; three more made .0 to .3, for as much.
+/// the antialiased truth with softened outlines, for half to two thirds as much time for fitting again; three more made .0 to .3, for as much.
 const TURNS: usize = 2;
 
 /// Sorts `sheets` front to back, and chooses their tests and the fields that these ask for.
