@@ -48,8 +48,7 @@ type Distances = [Option<f32>; 4];
 pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers, labels: usize) -> Fields {
     let thin = thin_labels(gbuffer, grid, sheets, labels);
     let outlines = Outlines { gbuffer, grid, sheets, layers, thin: &thin };
-    let first = fit::solve_for(&outlines.problem(None, false)).uv;
-    let distance = outlines.refit(first, false);
+    let distance = outlines.fit(false);
     Fields { distance, thin }
 }
 
@@ -58,8 +57,7 @@ impl Fields {
     #[must_use]
     pub fn tested(self, gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers) -> Self {
         let outlines = Outlines { gbuffer, grid, sheets, layers, thin: &self.thin };
-        let first = fit::solve_for(&outlines.problem(None, true)).uv;
-        Self { distance: outlines.refit(first, true), thin: self.thin }
+        Self { distance: outlines.fit(true), thin: self.thin }
     }
 
     /// Likewise, on from what they are.
@@ -111,6 +109,11 @@ impl<'a> Outlines<'a> {
         let &Outlines { grid, sheets, layers, .. } = self;
         let targets = move |index: usize, frame: u32, targets: &mut Vec<Target>| self.targets(index, frame, tested, targets);
         Problem { grid, sheets, layers, time: TIME_LINEAR, space: SPACE_LINEAR, prior: None, known, refit: hinge, targets }
+    }
+
+    /// The fields of those sheets that are tested by them, or of all, from nothing.
+    fn fit(&self, tested: bool) -> Vec<[f32; 2]> {
+        self.refit(fit::solve_for(&self.problem(None, tested)).uv, tested)
     }
 
     /// `fields` after a few refits, as the player will have them.
