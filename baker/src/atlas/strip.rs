@@ -2,10 +2,13 @@
 //! `pack` hands in masks in an order of its own and takes the places; holes inside and between masks are filled by what comes later.
 
 use super::mask::{Mask, Run, next};
+use std::cmp::Reverse;
 use std::ops::Range;
 
 /// The most words a row has: 1024 texels.
 const WORDS: usize = 16;
+/// Words behind the last row: whoever looks for a run reads a row's words from where the run starts, and the one after them.
+const PAST: usize = WORDS + 1;
 
 /// A mask in one of its four turns.
 pub(super) struct Shape {
@@ -14,7 +17,8 @@ pub(super) struct Shape {
     height: u32,
     /// Texels in it.
     pub area: u32,
-    /// The longest first: they are the first to be in the way.
+    /// The longest first, then long ones before short ones, for they are the first to be in the way; of these now one here, now one there: what is in
+    /// the way of one is mostly in that of its neighbours, too.
     runs: Vec<Run>,
 }
 
@@ -29,7 +33,9 @@ impl Shape {
         for (turns, mask) in (0u8..).zip(&masks) {
             if !masks[..usize::from(turns)].contains(mask) {
                 let mut runs = mask.runs();
-                runs.sort_by_key(|run| (std::cmp::Reverse(run.length), run.row, run.start));
+                let longest = runs.iter().map(|run| run.length).max();
+                let rank = |run: &Run| (Some(run.length) != longest, Reverse(run.length.ilog2()), run.row.reverse_bits(), run.start);
+                runs.sort_by_key(rank);
                 out.push(Self { turns, width: mask.width, height: mask.height, area: mask.area(), runs });
             }
         }
@@ -57,12 +63,10 @@ pub(super) struct Strip {
     rim: u32,
     /// Rows up to the last that holds something, and the rim.
     pub height: u32,
-    /// Levels a row has.
-    levels: usize,
-    /// Words a level of a row has.
+    /// Words a row has.
     words: usize,
-    /// Level k of a row says for each texel whether one of the 2^k from it on is taken, gutters included: two of them tell of any run.
-    taken: Vec<u64>,
+    /// Level k says for each texel of each row whether one of the 2^k from it on is taken, gutters included: two of them tell of any run.
+    taken: Vec<Vec<u64>>,
     /// The longest run of free texels in each row.
     free: Vec<u32>,
 }
@@ -70,16 +74,15 @@ pub(super) struct Strip {
 impl Strip {
     /// An empty strip, `width` texels wide, a power of two up to 1024.
     pub fn new(width: u32, most: u32, gutter: u32, rim: u32) -> Self {
-        let (levels, words) = (width.ilog2() as usize + 1, width as usize / 64);
+        let words = width as usize / 64;
         Self {
             width,
             most,
             gutter,
             rim,
             height: 0,
-            levels,
             words,
-            taken: vec![0; words * levels * most as usize],
+            taken: vec![vec![0; words * most as usize + PAST]; width.ilog2() as usize + 1],
             free: vec![width; most as usize],
         }
     }
@@ -100,15 +103,27 @@ impl Strip {
 
     /// The best spot of a shape, if it is better than one that ends the strip at, and has its y and x at, `bound`.
     fn find(&self, shape: &Shape, bound: Option<(u32, u32, u32)>) -> Option<(u32, Spot)> {
+        // This is where packing spends its time: rows of a known number of words take half of it.
+        match self.words {
+            1 => self.find_in::<1>(shape, bound),
+            2 => self.find_in::<2>(shape, bound),
+            4 => self.find_in::<4>(shape, bound),
+            8 => self.find_in::<8>(shape, bound),
+            _ => self.find_in::<WORDS>(shape, bound),
+        }
+    }
+
+    /// The same in rows of `W` words.
+    fn find_in<const W: usize>(&self, shape: &Shape, bound: Option<(u32, u32, u32)>) -> Option<(u32, Spot)> {
         let rim = self.rim;
         let last = self.most.checked_sub(shape.height + rim)?;
         let right = self.width.checked_sub(shape.width + rim)?;
         // What has no texels lies anywhere.
         let longest = shape.runs.first().copied().unwrap_or(Run { row: 0, start: 0, length: 0 });
-        let words = self.words;
         // A set bit is a column that the shape's left edge cannot lie in.
-        let mut outside = [u64::MAX; WORDS];
-        (rim..=right).for_each(|x| outside[x as usize / 64] &= !(1 << (x % 64)));
+        let mut inside = [0; W];
+        set(&mut inside, rim, right + 1);
+        let outside = inside.map(|word: u64| !word);
         for y in rim..=last {
             let end = (y + shape.height + rim).max(self.height);
             if bound.is_some_and(|(e, by, _)| (end, y) > (e, by)) {
@@ -120,16 +135,16 @@ impl Strip {
             let mut blocked = outside;
             for run in &shape.runs {
                 let level = run.length.ilog2();
-                let row = &self.taken[((y + run.row) as usize * self.levels + level as usize) * words..][..words];
-                block(&mut blocked[..words], row, run.start);
+                let row = &self.taken[level as usize][(y + run.row) as usize * W..];
+                block_all(&mut blocked, row, run.start);
                 if run.length > 1 << level {
-                    block(&mut blocked[..words], row, run.start + run.length - (1 << level));
+                    block_all(&mut blocked, row, run.start + run.length - (1 << level));
                 }
-                if blocked[..words].iter().all(|&word| word == u64::MAX) {
+                if blocked.iter().fold(u64::MAX, |all, word| all & word) == u64::MAX {
                     break;
                 }
             }
-            if let Some(x) = next(&blocked[..words], 0, true) {
+            if let Some(x) = next(&blocked, 0, true) {
                 let better = bound.is_none_or(|bound| (end, y, x) < bound);
                 return better.then_some((end, Spot { x, y, turns: shape.turns }));
             }
@@ -147,10 +162,8 @@ impl Strip {
 
     /// Takes a shape out again; `others`: all that lie in the strip besides.
     pub fn release<'s>(&mut self, shape: &Shape, spot: Spot, others: impl Iterator<Item = (&'s Shape, Spot)>) {
-        let (rows, all) = (self.rows(shape, spot), self.words * self.levels);
-        for y in rows.clone() {
-            self.taken[y as usize * all..][..self.words].fill(0);
-        }
+        let (rows, words) = (self.rows(shape, spot), self.words);
+        self.taken[0][rows.start as usize * words..rows.end as usize * words].fill(0);
         self.height = 0;
         for (other, at) in others {
             // Gutters of what lies beside these rows reach into them.
@@ -170,28 +183,41 @@ impl Strip {
 
     /// Marks what a shape and its gutter take of `rows`, texel by texel.
     fn mark(&mut self, shape: &Shape, spot: Spot, rows: &Range<u32>) {
-        let (gutter, all) = (self.gutter, self.words * self.levels);
+        let (gutter, words) = (self.gutter, self.words);
         for run in &shape.runs {
             let (left, right) = ((spot.x + run.start).saturating_sub(gutter), (spot.x + run.start + run.length + gutter).min(self.width));
             let row = spot.y + run.row;
             for y in row.saturating_sub(gutter).max(rows.start)..(row + gutter + 1).min(rows.end) {
-                set(&mut self.taken[y as usize * all..][..self.words], left, right);
+                set(&mut self.taken[0][y as usize * words..][..words], left, right);
             }
         }
     }
 
     /// Tells the other levels of `rows` from the lowest, and what is free there.
     fn tell(&mut self, rows: Range<u32>) {
-        let (words, all) = (self.words, self.words * self.levels);
-        for y in rows {
-            let row = &mut self.taken[y as usize * all..][..all];
-            for level in 1..self.levels {
-                let (below, here) = row[(level - 1) * words..(level + 1) * words].split_at_mut(words);
+        let words = self.words;
+        let all = rows.start as usize * words..rows.end as usize * words;
+        for level in 1..self.taken.len() {
+            let [below, here] = &mut self.taken[level - 1..=level] else { break };
+            for (below, here) in below[all.clone()].chunks_exact(words).zip(here[all.clone()].chunks_exact_mut(words)) {
                 here.copy_from_slice(below);
                 block(here, below, 1 << (level - 1));
             }
-            self.free[y as usize] = longest_free(&row[..words], self.width);
         }
+        for (row, free) in self.taken[0][all].chunks_exact(words).zip(&mut self.free[rows.start as usize..]) {
+            *free = longest_free(row, self.width);
+        }
+    }
+}
+
+/// Adds to `out` what is taken `by` texels further right in the row that `words` begin with. Beyond its end that is anything: no shape may lie there.
+#[inline(always)]
+fn block_all<const W: usize>(out: &mut [u64; W], words: &[u64], by: u32) {
+    let (first, part) = (by as usize / 64, by % 64);
+    let words = &words[first..][..=W];
+    for (i, out) in out.iter_mut().enumerate() {
+        // Shifted twice, since 64 is too far at once.
+        *out |= words[i] >> part | words[i + 1] << 1 << (63 - part);
     }
 }
 
@@ -199,12 +225,12 @@ impl Strip {
 #[inline]
 fn block(out: &mut [u64], row: &[u64], by: u32) {
     let (whole, part) = (by as usize / 64, by % 64);
-    let Some(row) = row.get(whole..) else { return };
-    for (i, (out, &word)) in out.iter_mut().zip(row).enumerate() {
+    let Some((last, row)) = row.get(whole..).and_then(|row| Some((row.last()?, row))) else { return };
+    for (out, words) in out.iter_mut().zip(row.windows(2)) {
         // Shifted twice, since 64 is too far at once.
-        let above = row.get(i + 1).map_or(0, |&word| word << 1 << (63 - part));
-        *out |= word >> part | above;
+        *out |= words[0] >> part | words[1] << 1 << (63 - part);
     }
+    out[row.len() - 1] |= last >> part;
 }
 
 /// Sets the bits `left`..`right`.
