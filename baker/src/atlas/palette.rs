@@ -84,16 +84,31 @@ fn distance(a: Seen, b: Seen) -> f32 {
     x * x + y * y + z * z
 }
 
-/// The nearest entry, the first of equals.
-fn nearest(palette: &[Seen], colour: Seen) -> usize {
-    let (mut best, mut least) = (0, f32::INFINITY);
-    for (i, &entry) in palette.iter().enumerate() {
-        let apart = distance(entry, colour);
-        if apart < least {
-            (best, least) = (i, apart);
-        }
+/// Entries by lightness, each with its index.
+struct Entries(Vec<(Seen, usize)>);
+
+impl Entries {
+    fn new(palette: impl IntoIterator<Item = Seen>) -> Self {
+        let mut entries: Vec<(Seen, usize)> = palette.into_iter().zip(0..).collect();
+        entries.sort_by(|(a, _), (b, _)| a[0].total_cmp(&b[0]));
+        Self(entries)
     }
-    best
+
+    /// The index of the nearest one, the first of equals, and how far away it is. Of those that differ more in lightness alone none is asked.
+    fn nearest(&self, colour: Seen) -> (usize, f32) {
+        let (darker, lighter) = self.0.split_at(self.0.partition_point(|(entry, _)| entry[0] < colour[0]));
+        let (mut best, mut least) = (usize::MAX, f32::INFINITY);
+        let mut ask = |&(entry, index): &(Seen, usize)| {
+            let (light, apart) = (entry[0] - colour[0], distance(entry, colour));
+            if apart < least || (apart == least && index < best) {
+                (best, least) = (index, apart);
+            }
+            light * light <= least
+        };
+        let _ = darker.iter().rev().all(&mut ask);
+        let _ = lighter.iter().all(ask);
+        (best, least)
+    }
 }
 
 /// A colour of the picture.
@@ -123,8 +138,8 @@ pub(super) fn reduce(colours: &[[u8; 3]], seen: &[u32], size: usize) -> (Vec<u16
     if palette.len() > size {
         palette = cluster(&space, &counted, &weighted, size);
     }
-    let entries: Vec<Seen> = palette.iter().map(|&rgb| space.seen(rgb)).collect();
-    let table: Vec<u16> = weighted.par_iter().map(|w| nearest(&entries, w.seen) as u16).collect();
+    let entries = Entries::new(palette.iter().map(|&rgb| space.seen(rgb)));
+    let table: Vec<u16> = weighted.par_iter().map(|w| entries.nearest(w.seen).0 as u16).collect();
     let index = |c: &[u8; 3]| weighted.binary_search_by_key(c, |w| w.rgb).map_or(0, |i| table[i]);
     (colours.par_iter().map(index).collect(), palette)
 }
@@ -162,7 +177,8 @@ fn cluster(space: &Space, counted: &[([u8; 3], u64)], weighted: &[Weighted], siz
     let mut entries: Vec<Seen> = start(counted, size).into_iter().map(|rgb| space.seen(rgb)).collect();
     let mut before: Vec<usize> = Vec::new();
     for _ in 0..ROUNDS {
-        let near: Vec<usize> = weighted.par_iter().map(|w| nearest(&entries, w.seen)).collect();
+        let sorted = Entries::new(entries.iter().copied());
+        let near: Vec<usize> = weighted.par_iter().map(|w| sorted.nearest(w.seen).0).collect();
         if near == before {
             break;
         }
@@ -197,10 +213,10 @@ fn cluster(space: &Space, counted: &[([u8; 3], u64)], weighted: &[Weighted], siz
 
 /// The colours that `palette` would gain by, the most first.
 fn gains(space: &Space, weighted: &[Weighted], palette: &[[u8; 3]]) -> Vec<[u8; 3]> {
-    let entries: Vec<Seen> = palette.iter().map(|&rgb| space.seen(rgb)).collect();
+    let entries = Entries::new(palette.iter().map(|&rgb| space.seen(rgb)));
     let gain = |w: &Weighted| {
         let then = widened(w.rgb);
-        let (now, after) = (distance(entries[nearest(&entries, w.seen)], w.seen), distance(space.seen(then), w.seen));
+        let (now, after) = (entries.nearest(w.seen).1, distance(space.seen(then), w.seen));
         (then, w.weight * f64::from(now - after))
     };
     let mut gains: Vec<([u8; 3], f64)> = weighted.par_iter().map(gain).filter(|g| g.1 > 0.0).collect();
@@ -233,6 +249,12 @@ mod tests {
         let [light, a, b] = space.seen([255, 0, 0]);
         let chroma = [a, b].map(|v| f64::from(v) / CHROMA);
         assert!((f64::from(light) - 0.628).abs() < 1e-3 && (chroma[0] - 0.225).abs() < 1e-3 && (chroma[1] - 0.126).abs() < 1e-3);
+    }
+
+    /// The nearest entry, the first of equals, all asked one after the other.
+    fn nearest(palette: &[Seen], colour: Seen) -> usize {
+        let apart = |&i: &usize| distance(palette[i], colour);
+        (0..palette.len()).min_by(|i, j| apart(i).total_cmp(&apart(j))).unwrap()
     }
 
     /// A smooth picture: green to the right, blue down, the red of their difference.

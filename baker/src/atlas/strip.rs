@@ -117,7 +117,7 @@ impl Strip {
     fn find_in<const W: usize>(&self, shape: &Shape, bound: Option<(u32, u32, u32)>) -> Option<(u32, Spot)> {
         let rim = self.rim;
         let last = self.most.checked_sub(shape.height + rim)?;
-        let right = self.width.checked_sub(shape.width + rim)?;
+        let right = self.width.checked_sub(shape.width + rim).filter(|&right| rim <= right)?;
         // What has no texels lies anywhere.
         let longest = shape.runs.first().copied().unwrap_or(Run { row: 0, start: 0, length: 0 });
         // A set bit is a column that the shape's left edge cannot lie in.
