@@ -17,7 +17,11 @@ pub const ONE: i32 = 1 << WEIGHT_BITS;
 /// Fraction bits of a coordinate during playback.
 pub const PLAY_BITS: u32 = 16;
 
-/// A stored position in the source image: u and v in stored units from [`KEY_MIN`] on, 16 bits each, v in the upper half.
+/// The middle of stored coordinates.
+pub const KEY_MIDDLE: i32 = KEY_MIN + 0x8000;
+
+/// A stored position in the source image: u and v in stored units from [`KEY_MIDDLE`] on, signed, 16 bits each, v in the upper half.
+// Halves of a word with a sign are what processors multiply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub struct KeyUv(pub u32);
 
@@ -25,20 +29,20 @@ impl KeyUv {
     /// From u and v in stored units, clamped to the range there is.
     #[must_use]
     pub fn new(u: i32, v: i32) -> Self {
-        let stored = |x: i32| x.clamp(KEY_MIN, KEY_MAX).wrapping_sub(KEY_MIN) as u32;
-        Self(stored(v) << 16 | stored(u))
+        let stored = |x: i32| x.clamp(KEY_MIN, KEY_MAX).wrapping_sub(KEY_MIDDLE) as u16;
+        Self(u32::from(stored(v)) << 16 | u32::from(stored(u)))
     }
 
     /// u in stored units, [`KEY_MIN`]..=[`KEY_MAX`].
     #[must_use]
     pub const fn u(self) -> i32 {
-        ((self.0 & 0xffff) as i32).wrapping_add(KEY_MIN)
+        (self.0 as i16 as i32).wrapping_add(KEY_MIDDLE)
     }
 
     /// v in stored units, [`KEY_MIN`]..=[`KEY_MAX`].
     #[must_use]
     pub const fn v(self) -> i32 {
-        ((self.0 >> 16) as i32).wrapping_add(KEY_MIN)
+        (self.0 as i32 >> 16).wrapping_add(KEY_MIDDLE)
     }
 }
 

@@ -2,7 +2,7 @@
 //! wants to say. `nodes` lays out the chains; `predict` and `field` code their layers; `row` interpolates between keys.
 
 use crate::coder::Probability;
-use crate::fixed::{KeyUv, PLAY_BITS, PlayUv, field_distance};
+use crate::fixed::{KEY_MIN, KeyUv, PLAY_BITS, PlayUv, field_distance};
 use crate::format::LabelRecord;
 use crate::grid::Grid;
 use crate::lists::{Lists, Sheets};
@@ -76,7 +76,7 @@ impl<'m> Key<'m> {
     /// The position of layer `index`; past the last, the least there is.
     #[must_use]
     pub fn uv(&self, index: usize) -> KeyUv {
-        KeyUv(self.uv.get(index).copied().unwrap_or(0))
+        self.uv.get(index).map_or(KeyUv::new(KEY_MIN, KEY_MIN), |&uv| KeyUv(uv))
     }
 
     /// The fields of the `along`-th layer of `chain`, Q8 pixels; 0 where it has none.

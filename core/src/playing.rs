@@ -303,6 +303,7 @@ impl<'a> Playing<'a> {
             if !down {
                 // How the upper edge bends takes the row above it, which is gone then.
                 fill(top, row.checked_sub(1));
+                top.untell();
                 fill(bottom, Some(row));
                 fill(below, Some(row.wrapping_add(1)));
                 bottom.bend_down(top, below);

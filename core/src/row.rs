@@ -1,7 +1,7 @@
 //! A row of nodes at one moment: its layers interpolated in time, and how they bend from node to node.
 //! Keys come from the caller's memory, rows go to `sheet`.
 
-use crate::fixed::{KEY_MIN, KeyUv, ONE, PLAY_BITS, PlayUv, WEIGHT_BITS, field_distance};
+use crate::fixed::{KEY_MIDDLE, KeyUv, ONE, PLAY_BITS, PlayUv, WEIGHT_BITS, field_distance};
 use crate::format::LabelRecord;
 use crate::grid::Grid;
 use crate::key::{self, BACKDROP, Chain, Key, NONE};
@@ -25,11 +25,16 @@ impl Layer {
         PlayUv { u: self.u, v: self.v }
     }
 
-    /// The second difference of three on a line, of which `here` is the middle one.
+    /// How much less than this `other` is.
     #[inline(always)]
-    fn bend(before: Self, here: Self, after: Self) -> Self {
-        let second = |a: i32, b: i32, c: i32| a.wrapping_sub(b).wrapping_add(c.wrapping_sub(b));
-        Self { u: second(before.u, here.u, after.u), v: second(before.v, here.v, after.v) }
+    const fn less(self, other: Self) -> Self {
+        Self { u: self.u.wrapping_sub(other.u), v: self.v.wrapping_sub(other.v) }
+    }
+
+    /// How far it is to the `next` one. What that changes by from one to the next is the second difference of the three.
+    #[inline(always)]
+    const fn step(self, next: Self) -> Self {
+        next.less(self)
     }
 }
 
@@ -151,19 +156,18 @@ fn straight<'s>(slots: impl Iterator<Item = &'s mut i16>, from: &[i8], to: &[i8]
 }
 
 /// The sum of `four` positions times `weights`, in Q15.16, rounded to nearest, ties up; exact where one weight is one. Coordinates of
-/// `key_bits` fraction bits start at [`KEY_MIN`], and as the weights sum to one, so does the sum.
+/// `key_bits` fraction bits are stored from [`KEY_MIDDLE`] on, and as the weights sum to one, so is the sum.
 #[inline(always)]
-const fn blend([e, f, g, h]: [KeyUv; 4], [a, b, c, d]: Weights, key_bits: u32) -> Layer {
+fn blend(four: [KeyUv; 4], weights: Weights, key_bits: u32) -> Layer {
     let drop = key_bits.wrapping_add(WEIGHT_BITS).wrapping_sub(PLAY_BITS);
-    let start = (KEY_MIN << WEIGHT_BITS).wrapping_add(1i32.wrapping_shl(drop) >> 1);
-    // Magnitudes of weights sum to at most 1.6, stored coordinates are below 2^16: the sums fit.
-    let v = a.wrapping_mul((e.0 >> 16) as i32).wrapping_add(b.wrapping_mul((f.0 >> 16) as i32));
-    let v = v.wrapping_add(c.wrapping_mul((g.0 >> 16) as i32)).wrapping_add(d.wrapping_mul((h.0 >> 16) as i32));
-    // Both as they are stored in a word: what v adds to that is known.
-    let both = a.wrapping_mul(e.0 as i32).wrapping_add(b.wrapping_mul(f.0 as i32));
-    let both = both.wrapping_add(c.wrapping_mul(g.0 as i32)).wrapping_add(d.wrapping_mul(h.0 as i32));
-    let u = both.wrapping_sub(v.wrapping_shl(16));
-    Layer { u: start.wrapping_add(u).wrapping_shr(drop), v: start.wrapping_add(v).wrapping_shr(drop) }
+    let start = (KEY_MIDDLE << WEIGHT_BITS).wrapping_add(1i32.wrapping_shl(drop) >> 1);
+    // Magnitudes of weights sum to at most 1.6, what is stored is at most 2^15: weights fit 16 bits, and the sums fit. Half a word times half a word, and
+    // the sum so far, are one instruction of larger processors.
+    let sum = |half: fn(u32) -> i16| {
+        let products = weights.into_iter().zip(four).map(|(weight, uv)| i32::from(weight as i16).wrapping_mul(half(uv.0).into()));
+        products.fold(start, i32::wrapping_add).wrapping_shr(drop)
+    };
+    Layer { u: sum(|both| both as i16), v: sum(|both| (both >> 16) as i16) }
 }
 
 /// A row's chains, gone through by label and from left to right, beside those of another.
@@ -272,14 +276,19 @@ fn weigh<'k, T: Place>(
     }
 }
 
-/// Works out how the nodes `here` bend down, between those above and below them. Those above that had none above themselves bend as these do.
+/// Works out how the nodes `here` bend down, between those above and below them.
 #[inline(always)]
-fn bend_between(here: &mut [Node], upper: &mut [Node], lower: &[Node]) {
+fn bend_between(here: &mut [Node], upper: &[Node], lower: &[Node]) {
     for ((here, upper), lower) in here.iter_mut().zip(upper).zip(lower) {
-        here.down = Layer::bend(upper.layer, here.layer, lower.layer);
-        if upper.down.u == UNTOLD.u {
-            upper.down = here.down;
-        }
+        here.down = here.layer.step(lower.layer).less(upper.layer.step(here.layer));
+    }
+}
+
+/// Those of the nodes `upper` that had none above themselves bend as those `here`, below them, do.
+#[inline(never)]
+fn tell(upper: &mut [Node], here: &[Node]) {
+    for (upper, here) in upper.iter_mut().zip(here).filter(|(upper, _)| upper.down.u == UNTOLD.u) {
+        upper.down = here.down;
     }
 }
 
@@ -309,6 +318,8 @@ pub struct NodeRow<'m> {
     pub layer: &'m mut [Layer],
     /// There is a backdrop, which bends nowhere.
     pub still: bool,
+    /// How some layers bend down is for the next row to tell.
+    pub untold: bool,
     /// Fields, Q8 pixels; empty where the bundle has none.
     pub field: &'m mut [[i16; 2]],
 }
@@ -401,7 +412,7 @@ impl NodeRow<'_> {
         Beside { chains: self.chain.get(..self.chains).unwrap_or(&[]) }
     }
 
-    /// Works out how each layer bends across; how it bends down is left to [`NodeRow::bend_down`].
+    /// Works out how each layer bends across; how it bends down is left to [`NodeRow::bend_down`] or [`NodeRow::untell`].
     #[inline(never)]
     fn bend_across(&mut self) {
         let mut nodes = &mut *self.node;
@@ -411,29 +422,36 @@ impl NodeRow<'_> {
             if self.still && chain.label == BACKDROP {
                 continue;
             }
-            let (across, down) = (Layer::ZERO, UNTOLD);
             let [first, second, rest @ ..] = mine else {
-                mine.iter_mut().for_each(|node| *node = Node { across, down, ..*node });
+                mine.iter_mut().for_each(|node| node.across = Layer::ZERO);
                 continue;
             };
             // Each waits for the next one; the first bends as the second does, the last as the one before it.
-            (first.across, first.down) = (across, down);
-            let (mut before, mut here, mut bend) = (first.layer, second, across);
+            let (mut step, mut here, mut bend) = (first.layer.step(second.layer), second, Layer::ZERO);
             for after in rest {
-                bend = Layer::bend(before, here.layer, after.layer);
-                (before, here.across, here.down) = (here.layer, bend, down);
+                let next = here.layer.step(after.layer);
+                bend = next.less(step);
+                (step, here.across) = (next, bend);
                 here = after;
             }
-            (here.across, here.down) = (bend, down);
+            here.across = bend;
             if let [first, second, ..] = mine {
                 first.across = second.across;
             }
         }
     }
 
+    /// Says of no layer how it bends down: nothing is known of the row above.
+    pub fn untell(&mut self) {
+        let last = self.chain.get(..self.chains).unwrap_or(&[]).last();
+        let end = last.map_or(0, |chain| usize::from(chain.at.wrapping_add(chain.nodes())));
+        self.node.get_mut(..end).unwrap_or(&mut []).iter_mut().for_each(|node| node.down = UNTOLD);
+    }
+
     /// Works out how each layer bends down, given the rows above and below it; where the one above had none above itself, it bends as this one does.
     #[inline(never)]
     pub fn bend_down(&mut self, above: &mut Self, below: &Self) {
+        self.untold = false;
         let (mut uppers, mut lowers) = (Beside { chains: above.chain.get(..above.chains).unwrap_or(&[]) }, below.beside());
         for chain in self.chain.get(..self.chains).unwrap_or(&[]) {
             if self.still && chain.label == BACKDROP {
@@ -446,11 +464,18 @@ impl NodeRow<'_> {
                 let stop = chain.end.min(top).min(bottom);
                 let part = |at: usize| at..at.wrapping_add(stop.wrapping_sub(column).into());
                 let here = self.node.get_mut(part(chain.along(column))).unwrap_or(&mut []);
-                // Where there is none above, the next row tells.
-                if let Some(upper) = high.and_then(|high| above.node.get_mut(part(high))) {
-                    match low.and_then(|low| below.node.get(part(low))) {
-                        Some(lower) => bend_between(here, upper, lower),
-                        None => bend_on(here, upper),
+                match (high.and_then(|high| above.node.get_mut(part(high))), low.and_then(|low| below.node.get(part(low)))) {
+                    (Some(upper), Some(lower)) => {
+                        bend_between(here, upper, lower);
+                        if above.untold {
+                            tell(upper, here);
+                        }
+                    }
+                    (Some(upper), None) => bend_on(here, upper),
+                    // The next row tells.
+                    (None, _) => {
+                        here.iter_mut().for_each(|node| node.down = UNTOLD);
+                        self.untold = true;
                     }
                 }
                 // Only broken bundles have chains of no nodes.
@@ -503,7 +528,7 @@ impl NodeRow<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixed::{KEY_BITS, KEY_MAX};
+    use crate::fixed::{KEY_BITS, KEY_MAX, KEY_MIN};
 
     #[test]
     fn blend_is_exact_at_the_keys_and_keeps_constants() {
