@@ -58,8 +58,8 @@ impl Paint for Probes {
 
     #[inline(always)]
     fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, place: [u32; 2], shown: u32, out: &mut [Probe]) {
-        let label = side.tile.label;
-        span::part(&side.tile, place, shown, out, [0; 2], |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(side.tile.row) });
+        let label = side.tile.head.label();
+        span::part(&side.tile, place, shown, out, [0; 2], |at: Packed<WIDTH, ROWS>| Probe { label, at: at.at(side.tile.head.row()) });
     }
 }
 
@@ -70,7 +70,7 @@ fn probe<const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(tiles: &Tiles<'
     for (tile, pixels) in tiles.tiles.iter().zip(out.as_chunks_mut::<PIXELS>().0) {
         let window = |row: u16| Some(row).filter(|_| tile.in_window());
         let along = |row: u16, pixels: &mut [Probe; PIXELS], line: Line<'_>| {
-            span::along(pixels, line, |at: Packed<WIDTH, ROWS>| Probe { label: tile.label, at: at.at(row) });
+            span::along(pixels, line, |at: Packed<WIDTH, ROWS>| Probe { label: tile.head.label(), at: at.at(row) });
         };
         let one = Tiles { tiles: core::slice::from_ref(tile), ..*tiles };
         one.paint::<_, _, PIXELS>(pixels, false, window, along, backdrop);

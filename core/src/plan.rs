@@ -10,7 +10,7 @@ use crate::row::{Layer, Place};
 use crate::sheet::{Sheet, Stretch};
 use crate::site::Site;
 use crate::torn::{self, Mixed, Shown, Side};
-use crate::window::{Middle, Room, Tile, Window};
+use crate::window::{Head, Middle, Room, Tile, Window};
 use core::slice;
 
 /// A strip's blocks, in caller's memory.
@@ -77,16 +77,16 @@ impl Plan<'_> {
     /// Counts the tiles of every run of neighbours in one window, whatever they show.
     fn count(&mut self) {
         let Some((mut first, others)) = self.tile.get_mut(..self.tiles).and_then(<[_]>::split_first_mut) else { return };
-        let mut run = 1u8;
+        let mut more = 0u8;
         for tile in others {
-            if tile.row == first.row && run < u8::MAX {
-                run = run.wrapping_add(1);
+            if tile.head.row() == first.head.row() && more < u8::MAX {
+                more = more.wrapping_add(1);
             } else {
-                first.run = run;
-                (first, run) = (tile, 1);
+                first.head = first.head.before(more);
+                (first, more) = (tile, 0);
             }
         }
-        first.run = run;
+        first.head = first.head.before(more);
     }
 
     /// Plans a stretch of cells that show one sheet.
@@ -161,7 +161,7 @@ impl Plan<'_> {
         // An axis after the other: what is known of both at a time would not fit a small processor's registers.
         let done = lay_down::<TILES, USUAL, T>(slots, lines, cells);
         let done = lay_across::<TILES, USUAL, T>(slots.get_mut(..done).unwrap_or(&mut []), lines, cells);
-        self.near = slots.get(done.wrapping_sub(1)).and_then(|tiles| tiles.last()).map_or(self.near, |last| last.row);
+        self.near = slots.get(done.wrapping_sub(1)).and_then(|tiles| tiles.last()).map_or(self.near, |last| last.head.row());
         self.tiles = self.tiles.wrapping_add(done.wrapping_mul(TILES));
         done as u16
     }
@@ -214,13 +214,13 @@ impl Plan<'_> {
         if side == Some(self.sides.wrapping_sub(1)) {
             self.sides = self.sides.wrapping_sub(1);
         }
-        let Tile { row, label, .. } = most.tile;
-        if site.plain(label) {
+        let head = most.tile.head;
+        if site.plain(head.label()) {
             self.plain(1);
         } else {
             // Number by number: it would be moved by a call.
-            *slot = most.tile.of(label, row);
-            self.near = row;
+            *slot = most.tile.of(head);
+            self.near = head.row();
             self.tiles = self.tiles.wrapping_add(1);
         }
     }
@@ -300,20 +300,27 @@ impl Cells<'_> {
         Some(row).filter(|&row| self.room.holds(low, high, row, margin))
     }
 
-    /// The tiles of the cell that has these numbers at its corners, and these sums of second differences; `lane`: theirs.
+    /// The tiles of the cell between these edges, which bends by these sums of second differences, `more` all over; `lane`: theirs.
     #[inline(always)]
-    fn tiles<const TILES: usize>(&self, corners: [i32; 4], sums: [i32; 2], more: i32, lane: impl Fn(i32, u32) -> u32) -> [Tile; TILES] {
-        let cell = Middle::new(corners, sums).plus(more);
+    fn tiles<const TILES: usize>(
+        &self,
+        left: Edge,
+        right: Edge,
+        sums: [i32; 2],
+        more: i32,
+        lane: impl Fn(i32, u32) -> u32,
+    ) -> [Tile; TILES] {
+        let cell = Middle::between([left.at, right.at], [left.down, right.down], sums).plus(more);
         let tile = |right: bool| if TILES == 1 { cell } else { cell.quarter(right, self.low) }.lanes(3, &lane);
         core::array::from_fn(|right| tile(right > 0))
     }
 }
 
-/// It bulges by a 32nd of each of these `sums` of second differences: by more than rows of cells are made for.
+/// It bulges by a 32nd of each of these `sums` of second differences: by no more than rows of cells are made for.
 #[inline(always)]
-const fn bulges([across, down]: [i32; 2]) -> bool {
+const fn even([across, down]: [i32; 2]) -> bool {
     const MOST: u32 = (BULGE as u32) << 4;
-    (across as u32).wrapping_add(MOST) | (down as u32).wrapping_add(MOST) >= 2 * MOST
+    (across as u32).wrapping_add(MOST) | (down as u32).wrapping_add(MOST) < 2 * MOST
 }
 
 /// The sums of second differences of two nodes, one above the other, of a number that is `one` of a layer's two.
@@ -321,6 +328,58 @@ const fn bulges([across, down]: [i32; 2]) -> bool {
 fn sums<T: Place>(above: &T, below: &T, one: impl Fn(Layer) -> i32) -> [i32; 2] {
     let ([a, b], [c, d]) = (above.bends().map(&one), below.bends().map(&one));
     [a.wrapping_add(c), b.wrapping_add(d)]
+}
+
+/// A number at two nodes, one above the other, and how it bends there.
+#[derive(Clone, Copy)]
+struct Edge {
+    /// At the upper one, from where positions are counted.
+    at: i32,
+    /// How much more it is at the lower one.
+    down: i32,
+    /// The sums of its second differences, across and down.
+    sums: [i32; 2],
+}
+
+impl Edge {
+    /// Of a number that is `one` of a layer's two, counted from `start`; how it bends is still to be told.
+    #[inline(always)]
+    fn new<T: Place>(above: &T, below: &T, one: impl Fn(Layer) -> i32, start: i32) -> Self {
+        let at = one(above.layer()).wrapping_sub(start);
+        let down = one(below.layer()).wrapping_sub(start).wrapping_sub(at);
+        Self { at, down, sums: [0; 2] }
+    }
+
+    /// The same with how it bends.
+    #[inline(always)]
+    fn bent<T: Place>(self, above: &T, below: &T, one: impl Fn(Layer) -> i32) -> Self {
+        Self { sums: sums(above, below, one), ..self }
+    }
+
+    /// Whether both nodes are below `room`, and not below where positions are counted from.
+    #[inline(always)]
+    const fn inside(&self, room: u32) -> bool {
+        (self.at as u32) < room && (self.at.wrapping_add(self.down) as u32) < room
+    }
+
+    /// The same, counted from so much further on.
+    #[inline(always)]
+    const fn from(self, more: i32) -> Self {
+        Self { at: self.at.wrapping_sub(more), ..self }
+    }
+
+    /// The corners of the cell between this edge and the one to its `right`.
+    #[inline(always)]
+    const fn corners(&self, right: &Self) -> [i32; 4] {
+        [self.at, right.at, self.at.wrapping_add(self.down), right.at.wrapping_add(right.down)]
+    }
+
+    /// The sums of second differences at these.
+    #[inline(always)]
+    const fn bends(&self, right: &Self) -> [i32; 2] {
+        let ([a, b], [c, d]) = (self.sums, right.sums);
+        [a.wrapping_add(c), b.wrapping_add(d)]
+    }
 }
 
 /// Fills `slots` with v of the tiles of `cells` between nodes above and below, and their windows, as long as there are such; returns of how many cells.
@@ -334,30 +393,35 @@ fn lay_down<const TILES: usize, const USUAL: bool, T: Place>(
     let v = |layer: Layer| layer.uv().v;
     let margin = cells.margin();
     let room = cells.within(window.rows_log2);
-    let inside = |v: i32, row: i32| (v.wrapping_sub(row.wrapping_shl(16)).wrapping_sub(margin) as u32) < room;
-    let mut row = i32::from(cells.near);
+    let start_of = |row: i32| row.wrapping_shl(16).wrapping_add(margin);
     let mut edges = above.iter().zip(below);
     let Some((above, below)) = edges.next() else { return 0 };
-    let ([mut a, mut c], mut left) = ([v(above.layer()), v(below.layer())], sums(above, below, v));
-    if !(inside(a, row) && inside(c, row)) {
+    let mut start = start_of(cells.near.into());
+    let mut head = Head::new(cells.label, cells.near).word();
+    let mut left = Edge::new(above, below, v, start).bent(above, below, v);
+    if !left.inside(room) {
         // A window that holds nothing: the first cell finds its own.
-        row = 1 << 14;
+        let more = start_of(1 << 14).wrapping_sub(start);
+        (left, start) = (left.from(more), start.wrapping_add(more));
     }
     let mut done = 0usize;
     for (slots, (above, below)) in slots.iter_mut().zip(edges) {
-        let ([b, d], right) = ([v(above.layer()), v(below.layer())], sums(above, below, v));
-        let all = [left[0].wrapping_add(right[0]), left[1].wrapping_add(right[1])];
-        if !(inside(b, row) && inside(d, row)) {
-            let Some(other) = cells.window([a, b, c, d]) else { break };
-            row = other;
+        let mut right = Edge::new(above, below, v, start);
+        if !right.inside(room) {
+            let Some(row) = cells.window(left.corners(&right).map(|corner| corner.wrapping_add(start))) else { break };
+            let more = start_of(row).wrapping_sub(start);
+            (left, right, start) = (left.from(more), right.from(more), start.wrapping_add(more));
+            head = Head::new(cells.label, row as u16).word();
         }
-        if bulges(all) {
+        // Told last: before, registers hold where it is.
+        right = right.bent(above, below, v);
+        let bends = left.bends(&right);
+        if !even(bends) {
             break;
         }
-        let first = row.wrapping_shl(16);
-        let tiles = cells.tiles::<TILES>([a, b, c, d], all, first.wrapping_neg(), |x, log2| window.lane::<true>(x, log2));
-        *slots = tiles.map(|tile| tile.of(cells.label, row as u16));
-        (a, c, left) = (b, d, right);
+        let tiles = cells.tiles::<TILES>(left, right, bends, margin, |x, log2| window.lane::<true>(x, log2));
+        *slots = tiles.map(|tile| tile.of(Head::of(head)));
+        left = right;
         done = done.wrapping_add(1);
     }
     done
@@ -374,25 +438,28 @@ fn lay_across<const TILES: usize, const USUAL: bool, T: Place>(
     let margin = cells.margin();
     let room = cells.within(window.width_log2);
     let u = |layer: Layer| layer.uv().u;
-    let at = |node: &T| u(node.layer()).wrapping_sub(margin);
     let mut edges = above.iter().zip(below);
     let Some((above, below)) = edges.next() else { return 0 };
-    let ([mut a, mut c], mut left) = ([at(above), at(below)], sums(above, below, u));
-    if a as u32 >= room || c as u32 >= room {
+    let mut left = Edge::new(above, below, u, margin).bent(above, below, u);
+    if !left.inside(room) {
         return 0;
     }
     let mut done = 0usize;
     for (slots, (above, below)) in slots.iter_mut().zip(edges) {
-        let ([b, d], right) = ([at(above), at(below)], sums(above, below, u));
-        let all = [left[0].wrapping_add(right[0]), left[1].wrapping_add(right[1])];
-        if b as u32 >= room || d as u32 >= room || bulges(all) {
+        let right = Edge::new(above, below, u, margin);
+        if !right.inside(room) {
             break;
         }
-        let tiles = cells.tiles::<TILES>([a, b, c, d], all, margin, |x, log2| window.lane::<false>(x, log2));
+        let right = right.bent(above, below, u);
+        let bends = left.bends(&right);
+        if !even(bends) {
+            break;
+        }
+        let tiles = cells.tiles::<TILES>(left, right, bends, margin, |x, log2| window.lane::<false>(x, log2));
         for (slot, tile) in slots.iter_mut().zip(tiles) {
             *slot = slot.plus(&tile).from_middle(3);
         }
-        (a, c, left) = (b, d, right);
+        left = right;
         done = done.wrapping_add(1);
     }
     done

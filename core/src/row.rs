@@ -112,6 +112,8 @@ impl Place for Node {
 
 /// [`Node::down`] where there is no row above: the next row tells.
 const UNTOLD: Layer = Layer { u: i32::MIN, v: i32::MIN };
+/// What a row's chain with such nodes has instead of a place for fields: a row's fields stand where its layers do.
+const UNTOLD_HERE: u16 = 0;
 
 /// The keys around a moment.
 #[derive(Clone, Copy, Debug)]
@@ -318,8 +320,6 @@ pub struct NodeRow<'m> {
     pub layer: &'m mut [Layer],
     /// There is a backdrop, which bends nowhere.
     pub still: bool,
-    /// How some layers bend down is for the next row to tell.
-    pub untold: bool,
     /// Fields, Q8 pixels; empty where the bundle has none.
     pub field: &'m mut [[i16; 2]],
 }
@@ -451,9 +451,8 @@ impl NodeRow<'_> {
     /// Works out how each layer bends down, given the rows above and below it; where the one above had none above itself, it bends as this one does.
     #[inline(never)]
     pub fn bend_down(&mut self, above: &mut Self, below: &Self) {
-        self.untold = false;
         let (mut uppers, mut lowers) = (Beside { chains: above.chain.get(..above.chains).unwrap_or(&[]) }, below.beside());
-        for chain in self.chain.get(..self.chains).unwrap_or(&[]) {
+        for chain in self.chain.get_mut(..self.chains).unwrap_or(&mut []) {
             if self.still && chain.label == BACKDROP {
                 continue;
             }
@@ -467,7 +466,7 @@ impl NodeRow<'_> {
                 match (high.and_then(|high| above.node.get_mut(part(high))), low.and_then(|low| below.node.get(part(low)))) {
                     (Some(upper), Some(lower)) => {
                         bend_between(here, upper, lower);
-                        if above.untold {
+                        if uppers.chains.first().is_some_and(|chain| chain.field == UNTOLD_HERE) {
                             tell(upper, here);
                         }
                     }
@@ -475,7 +474,7 @@ impl NodeRow<'_> {
                     // The next row tells.
                     (None, _) => {
                         here.iter_mut().for_each(|node| node.down = UNTOLD);
-                        self.untold = true;
+                        chain.field = UNTOLD_HERE;
                     }
                 }
                 // Only broken bundles have chains of no nodes.

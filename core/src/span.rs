@@ -64,15 +64,16 @@ impl Tiles<'_> {
         along: impl Fn(W, &mut [T; PIXELS], Line<'_>),
         at: impl Fn(PlayUv, usize) -> T,
     ) {
-        let mut blocks = out.as_chunks_mut::<PIXELS>().0;
+        let blocks = out.as_chunks_mut::<PIXELS>().0;
         // The last tile may reach past the end.
-        let mut tiles = self.tiles.get(..blocks.len()).unwrap_or(self.tiles);
+        let most = blocks.len().min(self.tiles.len());
+        let (Some(mut tiles), Some(mut blocks)) = (self.tiles.get(..most), blocks.get_mut(..most)) else { return };
         while let Some(first) = tiles.first() {
-            let run = usize::from(first.run).max(1).min(tiles.len());
+            let run = first.head.run().min(tiles.len());
             let split = tiles.split_at_checked(run).zip(core::mem::take(&mut blocks).split_at_mut_checked(run));
             let Some(((here, others), (painted, unpainted))) = split else { return };
             (tiles, blocks) = (others, unpainted);
-            let Some(window) = window(first.row) else {
+            let Some(window) = window(first.head.row()) else {
                 let [even, odd] = [0, 1].map(|x| at(self.backdrop, x));
                 for pixels in painted.iter_mut().filter(|_| first.is_plain()) {
                     *pixels = core::array::from_fn(|x| if x & 1 == 0 { even } else { odd });

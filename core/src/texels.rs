@@ -215,7 +215,7 @@ impl<C: Colours, F: Filter<Colour = C::Colour>> Paint for Lookup<C, F> {
 
     #[inline(always)]
     fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, place: [u32; 2], shown: u32, out: &mut [u16]) {
-        let from = usize::from(side.tile.row).wrapping_shl(WIDTH);
+        let from = usize::from(side.tile.head.row()).wrapping_shl(WIDTH);
         span::part(&side.tile, place, shown, out, self.filter.offsets(WIDTH), |at: Packed<WIDTH, ROWS>| {
             self.filter.packed(at, |index| self.colours.colour(from.wrapping_add(index)))
         });

@@ -21,12 +21,69 @@ pub struct Tile {
     pub turn: u32,
     /// and from the left half to the right one.
     pub bend: u32,
+    /// What is said of it.
+    pub head: Head,
+}
+
+/// What is said of a tile.
+#[derive(Clone, Copy, Debug, Default, bytemuck::Pod, bytemuck::Zeroable)]
+#[repr(C)]
+pub struct Head {
+    /// What shows there; in the upper byte, how many more tiles there are in the window after this one, if it is the first.
+    what: u16,
     /// The window's first row.
-    pub row: u16,
+    row: u16,
+}
+
+impl Head {
+    /// That of a tile of `label` in the window from `row` on.
+    #[must_use]
+    #[inline(always)]
+    pub const fn new(label: u8, row: u16) -> Self {
+        Self { row, what: label as u16 }
+    }
+
+    /// The same in a word, which is written at once.
+    #[must_use]
+    #[inline(always)]
+    pub const fn word(self) -> u32 {
+        (self.row as u32) << 16 | self.what as u32
+    }
+
+    /// That of a word.
+    #[must_use]
+    #[inline(always)]
+    pub const fn of(word: u32) -> Self {
+        Self { row: (word >> 16) as u16, what: word as u16 }
+    }
+
+    /// The window's first row.
+    #[must_use]
+    #[inline(always)]
+    pub const fn row(self) -> u16 {
+        self.row
+    }
+
     /// What shows there.
-    pub label: u8,
-    /// How many tiles there are in the window from this one on, if it is the first.
-    pub run: u8,
+    #[must_use]
+    #[inline(always)]
+    pub const fn label(self) -> u8 {
+        self.what as u8
+    }
+
+    /// How many tiles there are in the window from this one on.
+    #[must_use]
+    #[inline(always)]
+    pub const fn run(self) -> usize {
+        ((self.what >> 8) as usize).wrapping_add(1)
+    }
+
+    /// The same, before so many `more` in its window.
+    #[must_use]
+    #[inline(always)]
+    pub const fn before(self, more: u8) -> Self {
+        Self { what: self.what & 0xff | (more as u16) << 8, ..self }
+    }
 }
 
 /// The pixels of a tile's row.
@@ -42,29 +99,29 @@ pub struct Line<'t> {
 
 impl Tile {
     /// One that shows nothing: its block is drawn in another way.
-    pub const NONE: Self = Self { down: [0; 2], at: 0, step: 0, turn: 0, bend: 0, row: u16::MAX, label: 0, run: 1 };
+    pub const NONE: Self = Self { down: [0; 2], at: 0, step: 0, turn: 0, bend: 0, head: Head::new(0, u16::MAX) };
     /// One that shows the backdrop's one colour.
-    pub const PLAIN: Self = Self { row: u16::MAX - 1, label: BACKDROP as u8, ..Self::NONE };
+    pub const PLAIN: Self = Self { head: Head::new(BACKDROP as u8, u16::MAX - 1), ..Self::NONE };
 
     /// It shows the backdrop's one colour.
     #[must_use]
     #[inline(always)]
     pub const fn is_plain(&self) -> bool {
-        self.row == Self::PLAIN.row
+        self.head.row() == Self::PLAIN.head.row()
     }
 
     /// It is in a window.
     #[must_use]
     #[inline(always)]
     pub const fn in_window(&self) -> bool {
-        self.row < Self::PLAIN.row
+        self.head.row() < Self::PLAIN.head.row()
     }
 
-    /// The same of `label`, in the window from `row` on.
+    /// The same with this `head`.
     #[must_use]
     #[inline(always)]
-    pub const fn of(self, label: u8, row: u16) -> Self {
-        Self { row, label, ..self }
+    pub const fn of(self, head: Head) -> Self {
+        Self { head, ..self }
     }
 
     /// The sum of two, of a lane each; of the label and in the window of the first.
@@ -166,7 +223,7 @@ impl Window {
             (Self::SMALL, 3) => Self::SMALL.packed(patch, row, 3),
             _ => self.packed(patch, row, log2),
         };
-        *slot = tile.of(label, row);
+        *slot = tile.of(Head::new(label, row));
     }
 
     /// [`Window::put`], written out where the window and `log2` are known.
@@ -206,15 +263,21 @@ impl Middle {
 
     /// Given the number at the corners, and the sums of second differences.
     #[inline(always)]
-    pub const fn new([a, b, c, d]: [i32; 4], [across, down]: [i32; 2]) -> Self {
-        let (above, below, left) = (b.wrapping_sub(a), d.wrapping_sub(c), c.wrapping_sub(a));
-        let (sum, turn, twice) = (above.wrapping_add(below), below.wrapping_sub(above), left.wrapping_mul(2));
+    pub const fn new([a, b, c, d]: [i32; 4], sums: [i32; 2]) -> Self {
+        Self::between([a, b], [c.wrapping_sub(a), d.wrapping_sub(b)], sums)
+    }
+
+    /// Given the number at the upper corners, how much more it is below them, and the sums of second differences.
+    #[inline(always)]
+    pub const fn between([a, b]: [i32; 2], [left, right]: [i32; 2], [across, down]: [i32; 2]) -> Self {
+        let (turn, twice) = (right.wrapping_sub(left), b.wrapping_sub(a).wrapping_mul(2));
+        let sides = left.wrapping_add(right);
         // The middle is an eighth of a mean second difference off the mean of the corners, either way; and where a tile is drawn, an eighth of that more.
         let bulge = across.wrapping_add(down);
         Self {
-            at: a.wrapping_add(sum.wrapping_add(twice) >> 2).wrapping_sub(bulge.wrapping_add(bulge >> 3) >> 5),
-            step: sum,
-            down: twice.wrapping_add(turn),
+            at: a.wrapping_add(twice.wrapping_add(sides) >> 2).wrapping_sub(bulge.wrapping_add(bulge >> 3) >> 5),
+            step: twice.wrapping_add(turn),
+            down: sides,
             turn,
             bend: across,
             fall: down,
