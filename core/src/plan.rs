@@ -158,9 +158,7 @@ impl Plan<'_> {
     fn grow<const TILES: usize, const USUAL: bool, T: Place>(&mut self, cells: &Cells<'_>, lines: [&[T]; 2]) -> u16 {
         let Some(slots) = self.tile.get_mut(self.tiles..).map(|slots| slots.as_chunks_mut::<TILES>().0) else { return 0 };
         let Some(slots) = slots.get_mut(..cells.most) else { return 0 };
-        // An axis after the other: what is known of both at a time would not fit a small processor's registers.
-        let done = lay_down::<TILES, USUAL, T>(slots, lines, cells);
-        let done = lay_across::<TILES, USUAL, T>(slots.get_mut(..done).unwrap_or(&mut []), lines, cells);
+        let done = lay::<TILES, USUAL, T>(slots, lines, cells);
         self.near = slots.get(done.wrapping_sub(1)).and_then(|tiles| tiles.last()).map_or(self.near, |last| last.head.row());
         self.tiles = self.tiles.wrapping_add(done.wrapping_mul(TILES));
         done as u16
@@ -382,84 +380,53 @@ impl Edge {
     }
 }
 
-/// Fills `slots` with v of the tiles of `cells` between nodes above and below, and their windows, as long as there are such; returns of how many cells.
+/// Fills `slots` with the tiles of `cells` between nodes above and below, as long as each fits a window; returns of how many cells.
 #[inline(always)]
-fn lay_down<const TILES: usize, const USUAL: bool, T: Place>(
-    slots: &mut [[Tile; TILES]],
-    [above, below]: [&[T]; 2],
-    cells: &Cells<'_>,
-) -> usize {
+fn lay<const TILES: usize, const USUAL: bool, T: Place>(slots: &mut [[Tile; TILES]], [above, below]: [&[T]; 2], cells: &Cells<'_>) -> usize {
     let window = cells.window_of::<USUAL>();
-    let v = |layer: Layer| layer.uv().v;
+    let (u, v) = (|layer: Layer| layer.uv().u, |layer: Layer| layer.uv().v);
     let margin = cells.margin();
-    let room = cells.within(window.rows_log2);
+    let [wide, high] = [window.width_log2, window.rows_log2].map(|log2| cells.within(log2));
     let start_of = |row: i32| row.wrapping_shl(16).wrapping_add(margin);
     let mut edges = above.iter().zip(below);
     let Some((above, below)) = edges.next() else { return 0 };
     let mut start = start_of(cells.near.into());
     let mut head = Head::new(cells.label, cells.near).word();
-    let mut left = Edge::new(above, below, v, start).bent(above, below, v);
-    if !left.inside(room) {
-        // A window that holds nothing: the first cell finds its own.
-        let more = start_of(1 << 14).wrapping_sub(start);
-        (left, start) = (left.from(more), start.wrapping_add(more));
-    }
-    let mut done = 0usize;
-    for (slots, (above, below)) in slots.iter_mut().zip(edges) {
-        let mut right = Edge::new(above, below, v, start);
-        if !right.inside(room) {
-            let Some(row) = cells.window(left.corners(&right).map(|corner| corner.wrapping_add(start))) else { break };
-            let more = start_of(row).wrapping_sub(start);
-            (left, right, start) = (left.from(more), right.from(more), start.wrapping_add(more));
-            head = Head::new(cells.label, row as u16).word();
-        }
-        // Told last: before, registers hold where it is.
-        right = right.bent(above, below, v);
-        let bends = left.bends(&right);
-        if !even(bends) {
-            break;
-        }
-        let tiles = cells.tiles::<TILES>(left, right, bends, margin, |x, log2| window.lane::<true>(x, log2));
-        *slots = tiles.map(|tile| tile.of(Head::of(head)));
-        left = right;
-        done = done.wrapping_add(1);
-    }
-    done
-}
-
-/// Adds u to the tiles in `slots`, likewise.
-#[inline(always)]
-fn lay_across<const TILES: usize, const USUAL: bool, T: Place>(
-    slots: &mut [[Tile; TILES]],
-    [above, below]: [&[T]; 2],
-    cells: &Cells<'_>,
-) -> usize {
-    let window = cells.window_of::<USUAL>();
-    let margin = cells.margin();
-    let room = cells.within(window.width_log2);
-    let u = |layer: Layer| layer.uv().u;
-    let mut edges = above.iter().zip(below);
-    let Some((above, below)) = edges.next() else { return 0 };
     let mut left = Edge::new(above, below, u, margin).bent(above, below, u);
-    if !left.inside(room) {
+    let mut left_down = Edge::new(above, below, v, start).bent(above, below, v);
+    if !left.inside(wide) {
         return 0;
     }
+    if !left_down.inside(high) {
+        // A window that holds nothing: the first cell finds its own.
+        let more = start_of(1 << 14).wrapping_sub(start);
+        (left_down, start) = (left_down.from(more), start.wrapping_add(more));
+    }
     let mut done = 0usize;
     for (slots, (above, below)) in slots.iter_mut().zip(edges) {
-        let right = Edge::new(above, below, u, margin);
-        if !right.inside(room) {
+        let (mut right_down, right) = (Edge::new(above, below, v, start), Edge::new(above, below, u, margin));
+        if !right.inside(wide) {
             break;
         }
-        let right = right.bent(above, below, u);
-        let bends = left.bends(&right);
-        if !even(bends) {
+        if !right_down.inside(high) {
+            let corners = left_down.corners(&right_down).map(|corner| corner.wrapping_add(start));
+            let Some(row) = cells.window(corners) else { break };
+            let more = start_of(row).wrapping_sub(start);
+            (left_down, right_down, start) = (left_down.from(more), right_down.from(more), start.wrapping_add(more));
+            head = Head::new(cells.label, row as u16).word();
+        }
+        // Told last: before, registers hold where they are.
+        let (right, right_down) = (right.bent(above, below, u), right_down.bent(above, below, v));
+        let (bends, falls) = (left.bends(&right), left_down.bends(&right_down));
+        if !(even(bends) && even(falls)) {
             break;
         }
-        let tiles = cells.tiles::<TILES>(left, right, bends, margin, |x, log2| window.lane::<false>(x, log2));
-        for (slot, tile) in slots.iter_mut().zip(tiles) {
-            *slot = slot.plus(&tile).from_middle(3);
+        let across = cells.tiles::<TILES>(left, right, bends, margin, |x, log2| window.lane::<false>(x, log2));
+        let down = cells.tiles::<TILES>(left_down, right_down, falls, margin, |x, log2| window.lane::<true>(x, log2));
+        for (slot, (across, down)) in slots.iter_mut().zip(across.iter().zip(down)) {
+            *slot = down.plus(across).from_middle(3).of(Head::of(head));
         }
-        left = right;
+        (left, left_down) = (right, right_down);
         done = done.wrapping_add(1);
     }
     done
