@@ -154,7 +154,8 @@ fn cut<'m>(bundle: &Bundle<'m>, cutter: &mut Cutter<'m>, space: &mut Workspace<'
         row.node = cutter.take::<Node>(if cubic { row_layers } else { 0 });
         row.layer = cutter.take::<Layer>(if cubic { 0 } else { row_layers });
         row.field = cutter.take::<[i16; 2]>(if fields > 0 { row_layers } else { 0 });
-        row.still = still;
+        // Memory may hold anything.
+        (row.still, row.told) = (still, row_layers as u16);
     }
     let sheets = &mut space.sheets;
     (sheets.stretch, sheets.sheet) = (cutter.take::<Stretch>(grid.columns), cutter.take::<Sheet>(limits.row_sheets.into()));

@@ -382,7 +382,11 @@ impl Edge {
 
 /// Fills `slots` with the tiles of `cells` between nodes above and below, as long as each fits a window; returns of how many cells.
 #[inline(always)]
-fn lay<const TILES: usize, const USUAL: bool, T: Place>(slots: &mut [[Tile; TILES]], [above, below]: [&[T]; 2], cells: &Cells<'_>) -> usize {
+fn lay<const TILES: usize, const USUAL: bool, T: Place>(
+    slots: &mut [[Tile; TILES]],
+    [above, below]: [&[T]; 2],
+    cells: &Cells<'_>,
+) -> usize {
     let window = cells.window_of::<USUAL>();
     let (u, v) = (|layer: Layer| layer.uv().u, |layer: Layer| layer.uv().v);
     let margin = cells.margin();

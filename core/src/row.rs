@@ -322,13 +322,16 @@ pub struct NodeRow<'m> {
     pub still: bool,
     /// Fields, Q8 pixels; empty where the bundle has none.
     pub field: &'m mut [[i16; 2]],
+    /// How many of these may be other than zero.
+    pub told: u16,
 }
 
 impl NodeRow<'_> {
     fn clear(&mut self) {
         self.head.fill(NONE);
-        self.field.fill([0; 2]);
-        self.chains = 0;
+        // All others are zero already.
+        self.field.get_mut(..self.told.into()).unwrap_or_default().fill([0; 2]);
+        (self.chains, self.told) = (0, 0);
     }
 
     /// Opens a chain of `label` at nodes `first` to `end`, whose layers stand from `at` on; `None` where there is no room.
@@ -396,6 +399,7 @@ impl NodeRow<'_> {
         if ends.iter().all(|end| end.field == NONE) {
             return;
         }
+        self.told = chain.at.wrapping_add(chain.nodes());
         let slots = self.field.get_mut(usize::from(chain.at)..).unwrap_or(&mut []);
         let slots = slots.get_mut(..chain.nodes().into()).unwrap_or(&mut []);
         let [from, to] = [(keys.from, ends[0]), (keys.to, ends[1])].map(|(key, end)| {
