@@ -116,10 +116,20 @@ impl<'m> Lists<'m> {
     /// The sheets at `cursor`; empty where there is no cell.
     #[must_use]
     pub fn sheets(&self, cursor: Cursor) -> SheetsRef<'_> {
-        let Some((&head, rest)) = self.data.get(cursor.at..).and_then(<[u8]>::split_first) else { return SheetsRef::default() };
-        let Some((labels, rest)) = rest.split_at_checked(labels_of(head)) else { return SheetsRef::default() };
+        self.take(cursor).0
+    }
+
+    /// The same, and the cell to the right.
+    #[must_use]
+    #[inline(always)]
+    pub fn take(&self, cursor: Cursor) -> (SheetsRef<'_>, Cursor) {
+        let Some((&head, rest)) = self.data.get(cursor.at..).and_then(<[u8]>::split_first) else {
+            return (SheetsRef::default(), Cursor::NOWHERE);
+        };
+        let next = cursor.on(head, 1);
+        let Some((labels, rest)) = rest.split_at_checked(labels_of(head)) else { return (SheetsRef::default(), next) };
         let tests = rest.first_chunk().filter(|_| labels.len() > 1).map_or(0, |bytes| u16::from_le_bytes(*bytes));
-        SheetsRef { labels, tests }
+        (SheetsRef { labels, tests }, next)
     }
 
     /// The label at `cursor`, where it is the only one.

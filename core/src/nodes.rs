@@ -251,8 +251,9 @@ impl<'l, 'm> Cells<'l, 'm> {
             }
             column = column.wrapping_add(1);
             for (lists, cursor) in self.0.iter_mut().flatten() {
-                pass(first..column as u16, lists.sheets(*cursor));
-                *cursor = cursor.next(lists);
+                let (sheets, next) = lists.take(*cursor);
+                pass(first..column as u16, sheets);
+                *cursor = next;
             }
         }
     }

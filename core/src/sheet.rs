@@ -102,7 +102,7 @@ impl RowSheets<'_> {
         self.found.iter_mut().for_each(|found| found.end = 0);
         for stretch in self.stretch.iter_mut() {
             let Some(left) = grid.columns.checked_sub(column).filter(|&left| left > 0) else { break };
-            let listed = lists.sheets(cursor);
+            let (listed, next) = lists.take(cursor);
             let (first, mut end) = (count, 0);
             for (label, test) in listed.each() {
                 let Some((known, slot)) = self.found.get_mut(usize::from(label)).zip(self.sheet.get_mut(count)) else { continue };
@@ -115,7 +115,7 @@ impl RowSheets<'_> {
                 *slot = Sheet { nodes: known.nodes, label, test: test as u8 }.further((column as u16).wrapping_sub(known.column));
                 count = count.wrapping_add(1);
             }
-            cursor = cursor.next(lists);
+            cursor = next;
             let mut cells = 1usize;
             if let &[label] = listed.labels
                 && count != first
