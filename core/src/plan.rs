@@ -8,7 +8,7 @@
 use crate::fixed::PlayUv;
 use crate::row::{Layer, Place};
 use crate::sheet::{Sheet, Stretch};
-use crate::site::Site;
+use crate::site::{BLOCK_LOG2, Site};
 use crate::torn::{self, Mixed, Shown, Side};
 use crate::window::{Head, Middle, Room, Tile, Window};
 use core::slice;
@@ -135,18 +135,24 @@ impl Plan<'_> {
 
     /// Appends tiles of smooth cells of `sheet`, from the `along`-th of its stretch on, `most` at most; returns of how many cells.
     fn extend(&mut self, across: &Across<'_, '_, '_>, sheet: &Sheet, along: u16, most: usize) -> u16 {
-        let Some(room) = &across.room else { return 0 };
+        // Smaller blocks have no code of their own.
+        let Some(room) = across.room.as_ref().filter(|_| across.log2 == BLOCK_LOG2) else { return 0 };
         let ([top, bottom], [above, below]) = (across.site.rows, sheet.further(along).nodes().map(usize::from));
         let cells = Cells { room, label: sheet.label(), low: across.down > 0, most, near: self.near };
+        if across.site.straight() {
+            let flat = [top.layer.get(above..).unwrap_or(&[]), bottom.layer.get(below..).unwrap_or(&[])];
+            return match across.blocks {
+                1 => self.grow::<1, false, _>(&cells, flat),
+                2 => self.grow::<2, false, _>(&cells, flat),
+                _ => 0,
+            };
+        }
         let bends = [top.node.get(above..).unwrap_or(&[]), bottom.node.get(below..).unwrap_or(&[])];
-        let flat = [top.layer.get(above..).unwrap_or(&[]), bottom.layer.get(below..).unwrap_or(&[])];
-        match (across.site.log2(), across.site.straight()) {
+        match across.blocks {
             // What most bundles are made of has code of its own.
-            (3, false) if room.window == Window::USUAL => self.grow::<1, true, _>(&cells, bends),
-            (3, false) => self.grow::<1, false, _>(&cells, bends),
-            (3, true) => self.grow::<1, false, _>(&cells, flat),
-            (4, false) => self.grow::<2, false, _>(&cells, bends),
-            (4, true) => self.grow::<2, false, _>(&cells, flat),
+            1 if room.window == Window::USUAL => self.grow::<1, true, _>(&cells, bends),
+            1 => self.grow::<1, false, _>(&cells, bends),
+            2 => self.grow::<2, false, _>(&cells, bends),
             _ => 0,
         }
     }
