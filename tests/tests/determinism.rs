@@ -19,7 +19,10 @@ fn bake_on(threads: usize, name: &str) -> Vec<u8> {
 #[test]
 fn the_number_of_threads_does_not_change_the_bundle() {
     for name in ["street", "terrain", "round-columns"] {
-        assert!(bake_on(1, name) == bake_on(7, name), "{name}: 7 threads");
+        let one = bake_on(1, name);
+        assert!(one == bake_on(2, name), "{name}: 2 threads");
+        assert!(one == bake_on(7, name), "{name}: 7 threads");
+        assert!(one == bake_on(1, name), "{name}: baked twice");
     }
 }
 

@@ -210,14 +210,20 @@ impl Strip {
     }
 }
 
+/// What two words that follow each other say, `by` bits further on, of which there are less than 64.
+#[inline(always)]
+const fn further([here, next]: [u64; 2], by: u32) -> u64 {
+    // Shifted twice, since 64 is too far at once.
+    here >> by | next << 1 << (63 - by)
+}
+
 /// Adds to `out` what is taken `by` texels further right in the row that `words` begin with. Beyond its end that is anything: no shape may lie there.
 #[inline(always)]
 fn block_all<const W: usize>(out: &mut [u64; W], words: &[u64], by: u32) {
     let (first, part) = (by as usize / 64, by % 64);
     let words = &words[first..][..=W];
     for (i, out) in out.iter_mut().enumerate() {
-        // Shifted twice, since 64 is too far at once.
-        *out |= words[i] >> part | words[i + 1] << 1 << (63 - part);
+        *out |= further([words[i], words[i + 1]], part);
     }
 }
 
@@ -227,8 +233,7 @@ fn block(out: &mut [u64], row: &[u64], by: u32) {
     let (whole, part) = (by as usize / 64, by % 64);
     let Some((last, row)) = row.get(whole..).and_then(|row| Some((row.last()?, row))) else { return };
     for (out, words) in out.iter_mut().zip(row.windows(2)) {
-        // Shifted twice, since 64 is too far at once.
-        *out |= words[0] >> part | words[1] << 1 << (63 - part);
+        *out |= further([words[0], words[1]], part);
     }
     out[row.len() - 1] |= last >> part;
 }
