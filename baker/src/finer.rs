@@ -7,7 +7,9 @@ use crate::bake::{BakeError, Flat, Progress, Settings};
 use crate::climb::{Free, Step, climb};
 use crate::made::Made;
 use crate::scene::Scene;
+use crate::seen::Seen;
 use crate::verify::Brief;
+use std::cmp::Ordering;
 
 /// Wrong pixels, percent, from which on smaller cells are worth a try. Most scenes have a tenth of that.
 const TORN: f64 = 2.0;
@@ -24,7 +26,7 @@ const FLICKER: f64 = 1.25;
 /// Why keys farther apart are used where neither many outlines nor bends are, and why closer ones.
 const STEADILY: &str = "surfaces go straight on from key to key";
 const TURNING: &str = "outlines turn on their way from key to key";
-/// What closer keys have to gain there, dB: they take time in every frame.
+/// What closer keys have to gain there, dB: they take time in every frame. As much may farther ones lose of what is seen.
 const TIME: f64 = 0.2;
 /// Frames between keys, at least, where nothing bends: keys closer than that take more of every frame's time than all else.
 const CLOSEST: u32 = 4;
@@ -84,7 +86,8 @@ fn climbs(cell: u32, quality: &Brief) -> Option<(&'static [Climb], &'static str)
     Some((climbs, why))
 }
 
-/// `usual`, or a bundle of other cells or intervals if that is worth more, as sparing counts it; and then why. `all`: quality before sheets were left out.
+/// `usual`, or a bundle of other cells or intervals if that is worth more, as sparing counts it; and then why. Closer keys may be worth it by what is `seen`
+/// of them instead, and farther ones have to be by both. `all`: quality before sheets were left out.
 ///
 /// # Errors
 /// Those of encoding, and of the player.
@@ -93,16 +96,34 @@ pub(crate) fn choose(
     flat: &Flat,
     usual: Made,
     all: &Brief,
+    seen: &Seen<'_>,
     progress: Progress<'_>,
 ) -> Result<(Made, Option<Other>), BakeError> {
     let Some((climbs, why)) = climbs(usual.settings.cell, all) else { return Ok((usual, None)) };
     let picture = usual.picture(flat);
+    let (exact, visible) = (usual.worth(picture), seen.worth(&usual, flat, picture)?);
+    let time = if all.path_error_texels.p99 < BENT { TIME } else { 0.0 };
+    // By how much `made` is worth more than the usual one.
+    let gain = |made: &Made| -> Result<f64, BakeError> {
+        let [before, after] = [&usual, made].map(|made| made.quality.wrong_surface_percent);
+        let exact = made.worth(picture) - exact;
+        let visible = || seen.worth(made, flat, picture).map(|worth| worth - visible);
+        let keys = made.settings.key_interval.cmp(&usual.settings.key_interval);
+        match keys {
+            Ordering::Greater if all.wrong_surface_percent < TORN && after > FLICKER * before => Ok(f64::NEG_INFINITY),
+            _ if made.settings.cell != usual.settings.cell || keys == Ordering::Equal => Ok(exact),
+            Ordering::Less if exact > time => Ok(exact - time),
+            Ordering::Less => Ok(visible()? - time),
+            Ordering::Greater if exact > 0.0 && visible()? + time < 0.0 => Ok(f64::NEG_INFINITY),
+            _ => Ok(exact),
+        }
+    };
     let free = Free { cell: true, interval: true, lambda: false, time: false, space: false, frames: scene.playback.frames };
     let mut better: Option<(f64, Made)> = None;
     let most: usize = climbs.iter().map(|(_, tries)| tries).sum();
     let mut tried = 0;
     for &(steps, tries) in climbs {
-        climb((usual.settings, usual.worth(picture)), &free, steps, tries, |settings| {
+        climb((usual.settings, 0.0), &free, steps, tries, |settings| {
             let closer = settings.key_interval < usual.settings.key_interval && all.path_error_texels.p99 < BENT;
             if closer && settings.key_interval < CLOSEST {
                 return Ok(None);
@@ -110,14 +131,11 @@ pub(crate) fn choose(
             progress("trying other cells", f64::from(tried) / most as f64);
             tried += 1;
             let made = Made::new(scene, flat, *settings)?;
-            let [before, after] = [&usual, &made].map(|made| made.quality.wrong_surface_percent);
-            let flickers =
-                all.wrong_surface_percent < TORN && settings.key_interval > usual.settings.key_interval && after > FLICKER * before;
-            let worth = if flickers { f64::NEG_INFINITY } else { made.worth(picture) - if closer { TIME } else { 0.0 } };
-            if worth > better.as_ref().map_or(usual.worth(picture), |&(most, _)| most) {
-                better = Some((worth, made));
+            let gain = gain(&made)?;
+            if gain > better.as_ref().map_or(0.0, |&(most, _)| most) {
+                better = Some((gain, made));
             }
-            Ok(Some(worth))
+            Ok(Some(gain))
         })?;
         if better.is_some() {
             break;
@@ -133,6 +151,7 @@ pub(crate) fn choose(
 mod tests {
     use super::*;
     use crate::scene::builtin;
+    use crate::trace::Tracer;
     use crate::{bake, verify};
 
     fn made(name: &str, size: [u32; 2], frames: u32, settings: Settings) -> (Scene, Flat, Made) {
@@ -145,7 +164,8 @@ mod tests {
 
     fn chosen(scene: &Scene, flat: &Flat, usual: Made) -> (Made, Option<Other>) {
         let all = usual.quality;
-        choose(scene, flat, usual, &all, &|_, _| {}).unwrap()
+        let tracer = Tracer::new(scene);
+        choose(scene, flat, usual, &all, &Seen::new(&tracer, None), &|_, _| {}).unwrap()
     }
 
     #[test]

@@ -37,6 +37,7 @@ pub mod repaint;
 pub mod report;
 mod samples;
 pub mod scene;
+mod seen;
 pub mod settle;
 pub mod shade;
 pub mod sheets;

@@ -1,0 +1,52 @@
+//! Bundles as they are seen: beside the antialiased scene, in the colours that they end up in. What outlines and texels lose there, no keys bring back, which
+//! exact rays do not tell. The scene and a painter come from `job`; `finer` asks what keys closer together or farther apart are worth.
+
+use crate::bake::{BakeError, Flat};
+use crate::made::Made;
+use crate::metrics;
+use crate::repaint::Painter;
+use crate::trace::Tracer;
+use crate::truth::{Truth, spread};
+use crate::verify;
+use std::sync::OnceLock;
+
+/// Frames compared.
+const COMPARED: u32 = 16;
+/// What twice the bytes of all but the source image have to bring, dB: what twice as many texels bring, or less.
+const DOUBLE: f64 = 0.5;
+
+/// The scene, to hold bundles against.
+pub(crate) struct Seen<'a> {
+    tracer: &'a Tracer<'a>,
+    painter: Option<&'a Painter>,
+    /// Rendered when it is first asked for.
+    pictures: OnceLock<Vec<(u32, Vec<u8>)>>,
+}
+
+impl<'a> Seen<'a> {
+    /// That of the scene whose rays `tracer` casts; bundles are to have colours by `painter`, if any.
+    pub fn new(tracer: &'a Tracer<'a>, painter: Option<&'a Painter>) -> Self {
+        Self { tracer, painter, pictures: OnceLock::new() }
+    }
+
+    /// The quality of `made`, which came from `flat`, less what all but its source image of `picture` bytes takes, dB.
+    ///
+    /// # Errors
+    /// Those of the player.
+    pub fn worth(&self, made: &Made, flat: &Flat, picture: usize) -> Result<f64, BakeError> {
+        let bundle = &made.encoded.bundle;
+        let painted = match self.painter {
+            Some(painter) => painter.painted(bundle, &flat.atlas.image, &made.settings.atlas)?,
+            None => None,
+        };
+        let psnr = verify::against_pictures(painted.as_ref().map_or(bundle, |(painted, _)| painted), self.pictures())?;
+        Ok(metrics::worth(psnr, bundle.len().saturating_sub(picture) as u64, DOUBLE))
+    }
+
+    fn pictures(&self) -> &[(u32, Vec<u8>)] {
+        self.pictures.get_or_init(|| {
+            let (scene, truth) = (self.tracer.scene(), Truth::by(self.tracer.of(self.tracer.scene())));
+            spread(scene.playback.frames, COMPARED).into_iter().map(|frame| (frame, truth.frame(frame))).collect()
+        })
+    }
+}
