@@ -86,6 +86,17 @@ fn climbs(cell: u32, quality: &Brief) -> Option<(&'static [Climb], &'static str)
     Some((climbs, why))
 }
 
+/// What `keys` closer together (`Less`) or farther apart gain, dB, that are worth so much more beside `exact` rays, less what `time` in every frame is worth; `visible`
+/// tells how much more by what is seen of them.
+fn gain<E>(keys: Ordering, exact: f64, time: f64, visible: impl FnOnce() -> Result<f64, E>) -> Result<f64, E> {
+    match keys {
+        Ordering::Less if exact > time => Ok(exact - time),
+        Ordering::Less => Ok(visible()? - TIME),
+        Ordering::Greater if exact > 0.0 && visible()? < -TIME => Ok(f64::NEG_INFINITY),
+        _ => Ok(exact),
+    }
+}
+
 /// `usual`, or a bundle of other cells or intervals if that is worth more, as sparing counts it; and then why. Closer keys may be worth it by what is `seen`
 /// of them instead, and farther ones have to be by both. `all`: quality before sheets were left out.
 ///
@@ -104,19 +115,17 @@ pub(crate) fn choose(
     let (exact, visible) = (usual.worth(picture), seen.worth(&usual, flat, picture)?);
     let time = if all.path_error_texels.p99 < BENT { TIME } else { 0.0 };
     // By how much `made` is worth more than the usual one.
-    let gain = |made: &Made| -> Result<f64, BakeError> {
+    let gained = |made: &Made| -> Result<f64, BakeError> {
         let [before, after] = [&usual, made].map(|made| made.quality.wrong_surface_percent);
-        let exact = made.worth(picture) - exact;
-        let visible = || seen.worth(made, flat, picture).map(|worth| worth - visible);
         let keys = made.settings.key_interval.cmp(&usual.settings.key_interval);
-        match keys {
-            Ordering::Greater if all.wrong_surface_percent < TORN && after > FLICKER * before => Ok(f64::NEG_INFINITY),
-            _ if made.settings.cell != usual.settings.cell || keys == Ordering::Equal => Ok(exact),
-            Ordering::Less if exact > time => Ok(exact - time),
-            Ordering::Less => Ok(visible()? - time),
-            Ordering::Greater if exact > 0.0 && visible()? + time < 0.0 => Ok(f64::NEG_INFINITY),
-            _ => Ok(exact),
+        if keys == Ordering::Greater && all.wrong_surface_percent < TORN && after > FLICKER * before {
+            return Ok(f64::NEG_INFINITY);
         }
+        let exact = made.worth(picture) - exact;
+        if made.settings.cell != usual.settings.cell {
+            return Ok(exact);
+        }
+        gain(keys, exact, time, || seen.worth(made, flat, picture).map(|worth| worth - visible))
     };
     let free = Free { cell: true, interval: true, lambda: false, time: false, space: false, frames: scene.playback.frames };
     let mut better: Option<(f64, Made)> = None;
@@ -131,11 +140,11 @@ pub(crate) fn choose(
             progress("trying other cells", f64::from(tried) / most as f64);
             tried += 1;
             let made = Made::new(scene, flat, *settings)?;
-            let gain = gain(&made)?;
-            if gain > better.as_ref().map_or(0.0, |&(most, _)| most) {
-                better = Some((gain, made));
+            let gained = gained(&made)?;
+            if gained > better.as_ref().map_or(0.0, |&(most, _)| most) {
+                better = Some((gained, made));
             }
-            Ok(Some(gain))
+            Ok(Some(gained))
         })?;
         if better.is_some() {
             break;
@@ -221,6 +230,27 @@ mod tests {
         let before = usual.quality.psnr_mean;
         let (kept, _) = chosen(&scene, &flat, usual);
         assert!(kept.settings.key_interval < 8 && kept.quality.psnr_mean > before + 2.0, "{before} {}", kept.told());
+    }
+
+    #[test]
+    fn closer_keys_gain_by_either_measure_and_farther_ones_by_both() {
+        let gain = |keys, exact, visible| gain(keys, exact, TIME, || Ok::<_, ()>(visible)).unwrap();
+        assert_eq!([gain(Ordering::Less, 0.5, -9.0), gain(Ordering::Less, -0.5, 0.5)], [0.5 - TIME, 0.5 - TIME]);
+        assert!(gain(Ordering::Less, -0.5, 0.5 * TIME) < 0.0);
+        assert_eq!([gain(Ordering::Greater, 0.5, -0.5 * TIME), gain(Ordering::Greater, -0.5, 9.0)], [0.5, -0.5]);
+        assert!(gain(Ordering::Greater, 0.5, -2.0 * TIME) < 0.0);
+    }
+
+    #[test]
+    fn closer_keys_are_kept_where_they_show() {
+        // The sparing of keys would not have them: of what they bring beside exact rays, twice the bytes have to bring more.
+        let (scene, flat, usual) = made("terrain", [128, 96], 49, Settings::default());
+        let (picture, tracer) = (usual.picture(&flat), Tracer::new(&scene));
+        let seen = Seen::new(&tracer, None);
+        let (exact, visible) = (usual.worth(picture), seen.worth(&usual, &flat, picture).unwrap());
+        let (kept, other) = chosen(&scene, &flat, usual);
+        assert_eq!((kept.settings.cell, kept.settings.key_interval, other.is_some()), (8, 4, true));
+        assert!(kept.worth(picture) < exact && seen.worth(&kept, &flat, picture).unwrap() > visible + TIME, "{}", kept.told());
     }
 
     #[test]

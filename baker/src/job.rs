@@ -252,7 +252,8 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
     // Searches have left out what they could.
     let prunes = !options.all_sheets && options.goal == Goal::AsSet;
     let made = if prunes { fewer::choose(scene, &flat, made, progress)? } else { made };
-    let (made, other) = if free { finer::choose(scene, &flat, made, &all, &Seen::new(tracer, painter.as_ref()), progress)? } else { (made, None) };
+    let (made, other) =
+        if free { finer::choose(scene, &flat, made, &all, &Seen::new(tracer, painter.as_ref()), progress)? } else { (made, None) };
     let bends = options.goal == Goal::AsSet && options.space.is_none();
     let (made, spaces) = if bends { straight::choose(scene, &flat, made, progress)? } else { (made, Vec::new()) };
     // In other cells what a sheet has to save is another thing.
