@@ -79,7 +79,7 @@ pub struct Bake {
     ///
     /// Keys twice as far apart take a third fewer bytes and half as much of every frame's time. Each holds more, for what comes into view between two of
     /// them: that is up to a sixth more memory. Without this and --cell they are tried where surfaces go nearly straight on from key to key, and closer
-    /// ones where that leads nowhere.
+    /// ones where that leads nowhere: what is seen of either beside the antialiased scene decides, and what it takes.
     #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(1..=256))]
     pub key_interval: Option<u32>,
     /// Keys stand every --key-interval frames, whether or not they are needed there.
