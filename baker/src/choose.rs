@@ -9,7 +9,7 @@ use crate::encode;
 use crate::job::something_seen;
 use crate::scene::Scene;
 use crate::trace::Tracer;
-use crate::truth::{Truth, spread};
+use crate::truth::Truth;
 use crate::verify;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -48,7 +48,7 @@ pub fn charts(tracer: &Tracer<'_>, settings: &Settings, rewarp: Option<bool>, pr
     let cast = Cast::by(tracer.of(&small), &|_, _| {});
     let hits = &cast.hits;
     let truth = Truth::by(tracer.of(&small));
-    let pictures: Vec<(u32, Vec<u8>)> = spread(small.playback.frames, COMPARED).into_iter().map(|f| (f, truth.frame(f))).collect();
+    let pictures = truth.frames(COMPARED);
     let settings_of = |family: Family, rewarped: bool| {
         let charts = Choice { rewarped, ..family.into() };
         Settings { atlas: atlas::Settings { charts, ..settings.atlas }, ..settings }

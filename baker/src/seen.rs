@@ -6,7 +6,7 @@ use crate::made::Made;
 use crate::metrics;
 use crate::repaint::Painter;
 use crate::trace::Tracer;
-use crate::truth::{Truth, spread};
+use crate::truth::Truth;
 use crate::verify;
 use std::sync::OnceLock;
 
@@ -44,9 +44,6 @@ impl<'a> Seen<'a> {
     }
 
     fn pictures(&self) -> &[(u32, Vec<u8>)] {
-        self.pictures.get_or_init(|| {
-            let (scene, truth) = (self.tracer.scene(), Truth::by(self.tracer.of(self.tracer.scene())));
-            spread(scene.playback.frames, COMPARED).into_iter().map(|frame| (frame, truth.frame(frame))).collect()
-        })
+        self.pictures.get_or_init(|| Truth::by(self.tracer.of(self.tracer.scene())).frames(COMPARED))
     }
 }

@@ -52,6 +52,11 @@ impl<'a> Truth<'a> {
         picture
     }
 
+    /// At most `most` frames, evenly spread over the path: which, and as [`Truth::frame`] has it.
+    pub(crate) fn frames(&self, most: u32) -> Vec<(u32, Vec<u8>)> {
+        spread(self.scene.playback.frames, most).into_iter().map(|frame| (frame, self.frame(frame))).collect()
+    }
+
     fn sample(&self, lens: &Lens, x: f64, y: f64) -> Vec3 {
         match self.tracer.hit(lens.eye, lens.direction(x, y)) {
             // The side matters to lit materials only, and the shader asks for it there only.
