@@ -4,51 +4,72 @@
 //! This is where baking spends its time. Keys are mixed as patches' values, of which there are half as many as nodes: once an interval the values of
 //! every key, once a frame their mean, and back.
 
-use crate::patch::{AtNodes, CORNERS, NODES, Patch, Stencil, VALUES, Values};
+use crate::patch::{AtNodes, CORNERS, NODES, Patch, Stencil, Values};
 
 /// Weight of the second differences inside a cell, per pixel: keeps sheets that few pixels pin down flat.
 const TWIST: f32 = 1e-4;
 /// Weight of the first differences, per pixel: only what nothing else decides.
 const GRADIENT: f32 = 1e-7;
 
-/// A layer that is not there.
+/// A layer that is not there: there are fewer.
 pub const NOWHERE: u32 = u32::MAX;
 
 /// The weights of the keys at a moment, by which of the outer two are missing ([`crate::sheets::KeyGrid::weights`]).
 pub type Weights = [[f32; 4]; 4];
 
-/// What one sheet in one cell and interval asks of its layers.
-pub struct Element {
+/// A key of nodes whose keys weigh the same.
+#[derive(Clone, Copy)]
+struct Way {
+    /// The set of weights.
+    set: u8,
+    /// Which of the four keys.
+    key: u8,
+    /// The layer of every node, [`NOWHERE`] where it has none, or other weights.
+    layer: [u32; NODES],
+}
+
+/// Ways of an element at most, and as many as most have: all nodes' keys weigh the same.
+const WAYS: [usize; 2] = [16, 4];
+
+/// What one sheet in one cell and interval asks of its layers, where its patch has `N` values: [`patch::VALUES`](crate::patch::VALUES), or no more than [`CORNERS`] where it cannot bend.
+pub struct Element<const N: usize> {
     /// The layers of every node's four keys, [`NOWHERE`] where there is none.
     pub layer: [[u32; 4]; NODES],
     /// The interval.
     pub interval: u32,
     /// For every node the set of weights its keys have in time.
     set: [u8; NODES],
-    /// The sets that nodes have, each with every key that weighs anything in it.
-    ways: Vec<[u8; 2]>,
+    /// The keys that weigh anything, by the sets that nodes have.
+    ways: Vec<Way>,
     stencil: Stencil,
     /// Pixels of the cell and interval.
     volume: f32,
     /// None: outlines are asked for by torn cells alone.
-    pixels: Option<Pixels>,
+    pixels: Option<Pixels<N>>,
 }
 
 /// The pixels that an element is fitted to.
-enum Pixels {
+enum Pixels<const N: usize> {
     /// The same ones in every frame, and all nodes' keys weigh the same: the products of the keys' weights, summed over the frames.
-    Same(Sums, [[f32; 4]; 4]),
+    Same(Sums<N>, [[f32; 4]; 4]),
     /// Those of each frame.
-    Each(Vec<Sums>),
+    Each(Vec<Sums<N>>),
 }
 
 /// The products of a patch's shares, summed over pixels: a symmetric matrix, all of it, for half of it takes longer to multiply.
-#[derive(Clone, Copy, Default, PartialEq)]
-pub struct Sums([[f32; VALUES]; VALUES]);
+#[derive(Clone, Copy, PartialEq)]
+pub struct Sums<const N: usize>([[f32; N]; N]);
 
-impl Sums {
+impl<const N: usize> Default for Sums<N> {
+    fn default() -> Self {
+        Self([[0.0; N]; N])
+    }
+}
+
+impl<const N: usize> Sums<N> {
     /// Adds a pixel with these shares and this weight.
-    pub fn add(&mut self, shares: &[f32; VALUES], weight: f32) {
+    #[inline]
+    pub fn add(&mut self, shares: &[f32; N], weight: f32) {
         for (column, share) in self.0.iter_mut().zip(shares) {
             let weight = weight * share;
             for (sum, share) in column.iter_mut().zip(shares) {
@@ -59,8 +80,8 @@ impl Sums {
 
     /// The product with a patch's values.
     #[inline]
-    fn times(&self, values: &Values) -> Values {
-        let mut out = [[0.0; 2]; VALUES];
+    fn times(&self, values: &[[f32; 2]; N]) -> [[f32; 2]; N] {
+        let mut out = [[0.0; 2]; N];
         for (column, [u, v]) in self.0.iter().zip(values) {
             for (out, sum) in out.iter_mut().zip(column) {
                 out[0] += sum * u;
@@ -72,22 +93,22 @@ impl Sums {
 
     /// What the pixels' values are in all, squared, where a patch's values are `values`.
     #[must_use]
-    pub fn square(&self, values: &[f32; VALUES]) -> f32 {
-        let row = |column: &[f32; VALUES]| column.iter().zip(values).map(|(sum, value)| sum * value).sum::<f32>();
+    pub fn square(&self, values: &[f32; N]) -> f32 {
+        let row = |column: &[f32; N]| column.iter().zip(values).map(|(sum, value)| sum * value).sum::<f32>();
         self.0.iter().zip(values).map(|(column, value)| value * row(column)).sum()
     }
 }
 
 /// `to` plus `weight` times `values`.
 #[inline]
-fn add(to: &mut Values, weight: f32, values: &Values) {
+fn add<const N: usize>(to: &mut [[f32; 2]; N], weight: f32, values: &[[f32; 2]; N]) {
     for (to, value) in to.iter_mut().zip(values) {
         to[0] += weight * value[0];
         to[1] += weight * value[1];
     }
 }
 
-impl Element {
+impl<const N: usize> Element<N> {
     /// What `patch` asks in an interval where its cell has `volume` pixels, before any of them is known.
     #[must_use]
     pub fn new(patch: &Patch, interval: usize, volume: f32) -> Self {
@@ -95,25 +116,41 @@ impl Element {
         let set = patch.chains.map(|chain| chain.map_or(0, |chain| chain.set() as u8));
         let carried = |set: usize| patch.chains.iter().flatten().find(move |chain| chain.set() == set);
         let ways = (0..4).filter_map(|set| Some((set, carried(set)?.layer)));
-        let ways = ways.flat_map(|(set, layer)| (0..4).filter(move |&key| layer[key].is_some()).map(move |key| [set as u8, key as u8]));
-        let (ways, stencil) = (ways.collect(), patch.stencil);
-        Self { layer, interval: interval as u32, set, ways, stencil, volume, pixels: None }
+        let ways = ways.flat_map(|(set, keys)| (0..4).filter(move |&key| keys[key].is_some()).map(move |key| (set as u8, key)));
+        let at = |node: usize, of: u8, key: usize| if set[node] == of { layer[node][key] } else { NOWHERE };
+        let way = |(set, key): (u8, usize)| Way { set, key: key as u8, layer: std::array::from_fn(|node| at(node, set, key)) };
+        let ways = ways.map(way).collect();
+        Self { layer, interval: interval as u32, set, ways, stencil: patch.stencil, volume, pixels: None }
     }
 
     /// What a weight of one at every node alone gives to the patch's values.
     #[must_use]
-    pub fn shares(&self) -> [[f32; VALUES]; NODES] {
+    pub fn shares(&self) -> [[f32; N]; NODES] {
         std::array::from_fn(|node| {
             let mut one = [[0.0; 2]; NODES];
             one[node][0] = 1.0;
-            self.stencil.values(&one).map(|value| value[0])
+            self.values(&one).map(|value| value[0])
         })
+    }
+
+    /// The patch's values, given its nodes.
+    #[inline]
+    fn values(&self, nodes: &AtNodes) -> [[f32; 2]; N] {
+        if N == CORNERS.len() {
+            std::array::from_fn(|corner| nodes[CORNERS[corner]])
+        } else {
+            let values = self.stencil.values(nodes);
+            std::array::from_fn(|value| values[value])
+        }
     }
 
     /// What sums over pixels times shares in the patch's values come to at its nodes.
     #[must_use]
-    pub fn at_nodes(&self, values: &Values) -> AtNodes {
-        self.stencil.transposed(values)
+    #[inline]
+    pub fn at_nodes(&self, values: &[[f32; 2]; N]) -> AtNodes {
+        let mut all = Values::default();
+        all[..N].copy_from_slice(values);
+        self.stencil.transposed(&all)
     }
 
     /// The weights of a node's keys.
@@ -123,9 +160,9 @@ impl Element {
     }
 
     /// Keeps the sums of every frame, in the smallest form; `frames` tells the keys' weights in each.
-    pub fn fill(&mut self, sums: Vec<Sums>, frames: &[Weights]) {
-        let first = self.ways.first().map_or(0, |way| way[0]);
-        let alike = self.ways.iter().all(|way| way[0] == first) && sums.windows(2).all(|pair| pair[0] == pair[1]);
+    pub fn fill(&mut self, sums: Vec<Sums<N>>, frames: &[Weights]) {
+        let first = self.ways.first().map_or(0, |way| way.set);
+        let alike = self.ways.iter().all(|way| way.set == first) && sums.windows(2).all(|pair| pair[0] == pair[1]);
         self.pixels = match sums.first() {
             _ if sums.iter().all(|&sums| sums == Sums::default()) => None,
             Some(&same) if alike => {
@@ -144,35 +181,38 @@ impl Element {
     }
 
     /// Adds the element's share of the product A x to `y`, given the keys' weights in every frame of its interval.
-    pub fn multiply(&self, weights: &[Weights], x: &[[f64; 2]], y: &mut [[f64; 2]]) {
-        if let Some(pixels) = &self.pixels {
-            self.multiply_pixels(pixels, weights, x, y);
+    pub fn multiply(&self, weights: &[Weights], x: &[[f32; 2]], y: &mut [[f64; 2]]) {
+        match &self.pixels {
+            None => (),
+            Some(pixels) if self.ways.len() <= WAYS[1] => self.multiply_pixels::<{ WAYS[1] }>(pixels, weights, x, y),
+            Some(pixels) => self.multiply_pixels::<{ WAYS[0] }>(pixels, weights, x, y),
         }
         let corner = |bits: usize| self.layer[CORNERS[bits & 3]][1 + (bits >> 2)];
         let held = regularised(self.volume, &std::array::from_fn(|bits| value(x, corner(bits))));
         held.into_iter().enumerate().for_each(|(bits, value)| give(y, corner(bits), value));
     }
 
-    /// Adds the share of its pixels.
-    fn multiply_pixels(&self, pixels: &Pixels, weights: &[Weights], x: &[[f64; 2]], y: &mut [[f64; 2]]) {
-        let (mut values, mut back) = ([[[0.0; 2]; VALUES]; 16], [[[0.0; 2]; VALUES]; 16]);
+    /// Adds the share of its pixels, where it has at most `W` ways.
+    #[inline]
+    fn multiply_pixels<const W: usize>(&self, pixels: &Pixels<N>, weights: &[Weights], x: &[[f32; 2]], y: &mut [[f64; 2]]) {
+        let (mut values, mut back) = ([[[0.0; 2]; N]; W], [[[0.0; 2]; N]; W]);
         for (values, way) in values.iter_mut().zip(&self.ways) {
-            *values = self.stencil.values(&std::array::from_fn(|node| value(x, self.of(*way, node))));
+            *values = self.values(&way.layer.map(|layer| value(x, layer)));
         }
         match pixels {
             Pixels::Same(sums, products) => {
                 for (back, to) in back.iter_mut().zip(&self.ways) {
-                    let mut mixed = Values::default();
+                    let mut mixed = [[0.0; 2]; N];
                     for (values, from) in values.iter().zip(&self.ways) {
-                        add(&mut mixed, products[usize::from(to[1])][usize::from(from[1])], values);
+                        add(&mut mixed, products[usize::from(to.key)][usize::from(from.key)], values);
                     }
                     *back = sums.times(&mixed);
                 }
             }
             Pixels::Each(frames) => {
                 for (sums, weights) in frames.iter().zip(weights) {
-                    let weight = |way: &[u8; 2]| weights[usize::from(way[0])][usize::from(way[1])];
-                    let mut now = Values::default();
+                    let weight = |way: &Way| weights[usize::from(way.set)][usize::from(way.key)];
+                    let mut now = [[0.0; 2]; N];
                     for (values, way) in values.iter().zip(&self.ways) {
                         add(&mut now, weight(way), values);
                     }
@@ -184,30 +224,26 @@ impl Element {
             }
         }
         for (back, way) in back.iter().zip(&self.ways) {
-            let nodes = self.stencil.transposed(back);
-            nodes.into_iter().enumerate().for_each(|(node, value)| give(y, self.of(*way, node), value));
+            if N == CORNERS.len() {
+                CORNERS.iter().zip(back).for_each(|(&node, &value)| give(y, way.layer[node], value));
+            } else {
+                self.at_nodes(back).into_iter().zip(way.layer).for_each(|(value, layer)| give(y, layer, value));
+            }
         }
-    }
-
-    /// The layer of a node in a way's key, if the node has the way's weights.
-    #[inline]
-    fn of(&self, [set, key]: [u8; 2], node: usize) -> u32 {
-        if self.set[node] == set { self.layer[node][usize::from(key)] } else { NOWHERE }
     }
 }
 
 /// What `x` has of a layer; zeros where there is none.
 #[inline]
-fn value(x: &[[f64; 2]], layer: u32) -> [f32; 2] {
-    if layer == NOWHERE { [0.0; 2] } else { x[layer as usize].map(|x| x as f32) }
+fn value(x: &[[f32; 2]], layer: u32) -> [f32; 2] {
+    x.get(layer as usize).copied().unwrap_or_default()
 }
 
 /// Adds to what `y` has of a layer, if there is one.
 #[inline]
 fn give(y: &mut [[f64; 2]], layer: u32, [u, v]: [f32; 2]) {
-    if layer != NOWHERE {
-        let y = &mut y[layer as usize];
-        (y[0], y[1]) = (y[0] + f64::from(u), y[1] + f64::from(v));
+    if let Some(y) = y.get_mut(layer as usize) {
+        *y = [y[0] + f64::from(u), y[1] + f64::from(v)];
     }
 }
 
@@ -247,7 +283,7 @@ fn regularised(volume: f32, values: &[[f32; 2]; 8]) -> [[f32; 2]; 8] {
 mod tests {
     use super::*;
     use crate::gbuffer::GBuffer;
-    use crate::patch;
+    use crate::patch::{self, VALUES};
     use crate::sheets::{self, KeyGrid, Layers};
     use cubist_core::format::{SPACE_CUBIC, SPACE_LINEAR, TIME_CUBIC, TIME_LINEAR};
 
@@ -279,7 +315,7 @@ mod tests {
                 let weights: Vec<Weights> = grid.frames_of(place[0]).map(|frame| grid.weights(place[0], frame, time)).collect();
                 for (&label, varied) in list.iter().flat_map(|label| [(label, false), (label, true)]) {
                     let patch = Patch::new(&grid, &layers, place, label, ways);
-                    let mut element = Element::new(&patch, place[0], 0.0);
+                    let mut element = Element::<VALUES>::new(&patch, place[0], 0.0);
                     let [x, y] = [0; 2].map(|_| layers.label.iter().map(|_| [random.next(), random.next()]).collect::<Vec<[f32; 2]>>());
                     let (mut sums, mut exact) = (Vec::new(), [0.0f64; 2]);
                     for (frame, weights) in grid.frames_of(place[0]).zip(&weights) {
@@ -297,14 +333,14 @@ mod tests {
                     }
                     element.fill(sums, &weights);
                     let mut product = vec![[0.0; 2]; x.len()];
-                    element.multiply(&weights, &x.iter().map(|x| x.map(f64::from)).collect::<Vec<_>>(), &mut product);
+                    element.multiply(&weights, &x, &mut product);
                     for axis in 0..2 {
                         let found: f64 = product.iter().zip(&y).map(|(a, b)| a[axis] * f64::from(b[axis])).sum();
                         assert!((found - exact[axis]).abs() < 1e-4, "{place:?}, {label}: {found}, exactly {}", exact[axis]);
                     }
                     let kind = if matches!(element.pixels, Some(Pixels::Same(..))) { &mut same } else { &mut each };
                     *kind += 1;
-                    mixed += u32::from(element.ways.iter().any(|way| way[0] != element.ways[0][0]));
+                    mixed += u32::from(element.ways.iter().any(|way| way.set != element.ways[0].set));
                 }
             }
         }

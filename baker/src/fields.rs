@@ -4,6 +4,7 @@
 //!
 //! Things thinner than a few cells are *strips*: two fields, the distances from two opposite sides, both positive inside.
 
+use crate::around::{Around, NONE};
 use crate::fit::{self, Problem, Target};
 use crate::gbuffer::GBuffer;
 use crate::sheets::{KeyGrid, Layers, Sheets};
@@ -125,29 +126,27 @@ impl<'a> Outlines<'a> {
         fields.iter().map(|pair| pair.map(|field| distance(code(field)))).collect()
     }
 
-    /// What the sheets of a cell and interval ask of its pixels in a frame: those that are tested by their fields, or all.
+    /// What the sheets of a cell and interval ask of its pixels in a frame, given no targets: those that are tested by their fields, or all.
     fn targets(&self, index: usize, frame: u32, tested: bool, targets: &mut Vec<Target>) {
         let &Outlines { gbuffer, grid, .. } = self;
         let list = &self.sheets.lists[index];
         if list.len() < 2 {
             return;
         }
-        let cell = index % grid.grid.cells();
-        // The place in the list of what each pixel shows.
-        let mut seen = Vec::new();
-        grid.each_pixel(frame, cell, |pixel, _| seen.push(list.iter().position(|&label| gbuffer.label[pixel] == u16::from(label))));
-        targets.resize(seen.len() * list.len(), None);
         let reach = REACH * (1u32 << grid.grid.log2) as f32;
+        let around = Around::new(gbuffer, grid, list, reach as usize, frame, index % grid.grid.cells());
         for (sheet, &label) in list.iter().enumerate().filter(|&(sheet, _)| !tested || tests_field(self.sheets, index, sheet)) {
-            let look = Look { gbuffer, grid, front: &list[..sheet], label, reach: reach as usize };
-            for ((pixel, &seen), distances) in seen.iter().enumerate().zip(&look.around(frame, cell)) {
+            let steps = around.steps(sheet as u8);
+            targets.resize(steps.len() * list.len(), None);
+            for ((pixel, shown), steps) in around.shown().enumerate().zip(&steps) {
                 // What is hidden by a sheet further in front does not matter, nor what no sheet shows.
-                if seen.is_none_or(|seen| seen < sheet) {
+                if shown == NONE || usize::from(shown) < sheet {
                     continue;
                 }
-                let inside = seen == Some(sheet);
+                let inside = usize::from(shown) == sheet;
+                let distances = steps.map(|steps| around.distance(steps));
                 targets[pixel * list.len() + sheet] = match self.thin[usize::from(label)] {
-                    Thin::No => Some(signed(*distances, inside, reach)),
+                    Thin::No => Some(signed(distances, inside, reach)),
                     Thin::Across => strip(distances[0], distances[1], inside, reach),
                     Thin::Down => strip(distances[2], distances[3], inside, reach),
                 };
@@ -198,62 +197,6 @@ fn strip(before: Option<f32>, after: Option<f32>, inside: bool, reach: f32) -> O
     Some((pair, 1.0 / (1.0 + (nearest / FALLOFF) * (nearest / FALLOFF))))
 }
 
-/// Looks from the pixels of a cell along their rows and columns.
-struct Look<'a> {
-    gbuffer: &'a GBuffer,
-    grid: &'a KeyGrid,
-    /// Labels that hide the sheet.
-    front: &'a [u8],
-    label: u8,
-    reach: usize,
-}
-
-impl Look<'_> {
-    /// For every pixel of a cell in a frame the distances at which the sheet ends, where it shows, or begins.
-    fn around(&self, frame: u32, cell: usize) -> Vec<Distances> {
-        let [width, height] = self.grid.size;
-        let [columns, rows] = self.grid.pixels(cell);
-        let [left, right] = [columns.start.saturating_sub(self.reach), (columns.end + self.reach).min(width)];
-        let [top, bottom] = [rows.start.saturating_sub(self.reach), (rows.end + self.reach).min(height)];
-        let mut distances = vec![[None; 4]; columns.len() * rows.len()];
-        let at = |x: usize, y: usize| {
-            let within = columns.contains(&x) && rows.contains(&y);
-            ((frame as usize * height + y) * width + x, within.then(|| (y - rows.start) * columns.len() + x - columns.start))
-        };
-        for y in rows.clone() {
-            self.sweep((left..columns.end).map(|x| at(x, y)), 0, &mut distances);
-            self.sweep((columns.start..right).rev().map(|x| at(x, y)), 1, &mut distances);
-        }
-        for x in columns.clone() {
-            self.sweep((top..rows.end).map(|y| at(x, y)), 2, &mut distances);
-            self.sweep((rows.start..bottom).rev().map(|y| at(x, y)), 3, &mut distances);
-        }
-        distances
-    }
-
-    /// Goes along a line of pixels and writes how far back the sheet ends, where it shows, or begins: the distance on one side of those that have
-    /// a place in the cell.
-    fn sweep(&self, line: impl Iterator<Item = (usize, Option<usize>)>, side: usize, distances: &mut [Distances]) {
-        // Steps from the last pixel that shows the sheet, and from the last one that shows neither it nor what hides it.
-        let [mut own, mut other] = [usize::MAX; 2];
-        for (pixel, place) in line {
-            [own, other] = [own.saturating_add(1), other.saturating_add(1)];
-            let label = self.gbuffer.label[pixel];
-            let inside = label == u16::from(self.label);
-            if let Some(place) = place {
-                let steps = if inside { other } else { own };
-                // The outline runs between the two pixel centres.
-                distances[place][side] = (steps <= self.reach).then_some(steps as f32 - 0.5);
-            }
-            if inside {
-                own = 0;
-            } else if !self.front.iter().any(|&front| u16::from(front) == label) {
-                other = 0;
-            }
-        }
-    }
-}
-
 /// Whether a label's runs of pixels are short, and along which axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Thin {
@@ -279,18 +222,17 @@ fn thin_labels(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, labels: usize
                 let (interval, cell) = (index / cells, index % cells);
                 let frames = grid.frames_of(interval);
                 let frame = frames.start + (frames.end - frames.start) / 2;
-                let look = |label| Look { gbuffer, grid, front: &[], label, reach: THIN * size };
                 let mut shown = Vec::new();
                 grid.each_pixel(frame, cell, |pixel, _| shown.push(gbuffer.label[pixel]));
                 let mut found: Vec<u8> = shown.iter().filter_map(|&label| u8::try_from(label).ok()).collect();
                 found.sort_unstable();
                 found.dedup();
-                let run = |a: Option<f32>, b: Option<f32>| a.zip(b).map_or(f32::INFINITY, |(a, b)| a + b);
                 for label in found {
-                    let distances = look(label).around(frame, cell);
-                    let own = distances.iter().zip(&shown).filter(|&(_, &shown)| shown == u16::from(label));
+                    let around = Around::new(gbuffer, grid, &[label], THIN * size, frame, cell);
+                    let run = |a: u8, b: u8| around.distance(a).zip(around.distance(b)).map_or(f32::INFINITY, |(a, b)| a + b);
+                    let own = around.shown().zip(around.steps(0)).filter(|&(shown, _)| shown == 0);
                     // The longest runs across and down.
-                    let runs = own.fold([0.0f32; 2], |most, (&[left, right, up, down], _)| {
+                    let runs = own.fold([0.0f32; 2], |most, (_, [left, right, up, down])| {
                         [most[0].max(run(left, right)), most[1].max(run(up, down))]
                     });
                     let count = &mut counts[usize::from(label)];

@@ -8,6 +8,7 @@ use crate::element::{self, Element, NOWHERE, Sums, Weights};
 use crate::gbuffer::GBuffer;
 use crate::patch::{self, CORNERS, NODES, Patch, VALUES, Values};
 use crate::sheets::{KeyGrid, Layers, Sheets};
+use cubist_core::format::SPACE_LINEAR;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -100,8 +101,19 @@ pub fn solve_for<T>(problem: &Problem<'_, T>) -> Fit
 where
     T: Fn(usize, u32, &mut Vec<Target>) + Sync,
 {
+    match problem.space {
+        SPACE_LINEAR => solve_of::<{ CORNERS.len() }, T>(problem),
+        _ => solve_of::<VALUES, T>(problem),
+    }
+}
+
+/// Likewise, where patches have `N` values.
+fn solve_of<const N: usize, T>(problem: &Problem<'_, T>) -> Fit
+where
+    T: Fn(usize, u32, &mut Vec<Target>) + Sync,
+{
     let weights = weights(problem);
-    let System { elements, mut right, mut diagonal, mut start } = assemble(problem, &weights);
+    let System { elements, mut right, mut diagonal, mut start } = assemble::<N, T>(problem, &weights);
     if let Some(known) = problem.known {
         start = known.iter().map(|uv| uv.map(f64::from)).collect();
     }
@@ -118,7 +130,8 @@ where
     }
     let runs = runs(&elements);
     let product = |x: &[[f64; 2]], y: &mut [[f64; 2]]| {
-        multiply(&runs, &weights, x, y);
+        let lower: Vec<[f32; 2]> = x.iter().map(|x| x.map(|x| x as f32)).collect();
+        multiply(&runs, &weights, &lower, y);
         for ((y, x), held) in y.iter_mut().zip(x).zip(&held) {
             y[0] += held * x[0];
             y[1] += held * x[1];
@@ -137,8 +150,8 @@ fn weights<T>(problem: &Problem<'_, T>) -> Vec<Vec<Weights>> {
 }
 
 /// What is to be solved.
-struct System {
-    elements: Vec<Element>,
+struct System<const N: usize> {
+    elements: Vec<Element<N>>,
     right: Vec<[f64; 2]>,
     diagonal: Vec<f64>,
     /// Every layer at the mean of its sheets' targets, to start from.
@@ -146,17 +159,17 @@ struct System {
 }
 
 /// An element with its right-hand side.
-struct Assembled {
-    element: Element,
+struct Assembled<const N: usize> {
+    element: Element<N>,
     /// What each node gives to the patch's values.
-    shares: [[f32; VALUES]; NODES],
+    shares: [[f32; N]; NODES],
     right: [[[f32; 2]; 4]; NODES],
     diagonal: [[f32; 4]; NODES],
     /// Sum of the weights and weighted targets of its pixels.
     seen: [f64; 3],
 }
 
-fn assemble<T>(problem: &Problem<'_, T>, weights: &[Vec<Weights>]) -> System
+fn assemble<const N: usize, T>(problem: &Problem<'_, T>, weights: &[Vec<Weights>]) -> System<N>
 where
     T: Fn(usize, u32, &mut Vec<Target>) + Sync,
 {
@@ -166,7 +179,7 @@ where
     let mut means = vec![[0.0f64; 3]; layers];
     // An interval at a time: right-hand sides are large.
     for lists in (0..problem.sheets.lists.len()).step_by(cells) {
-        let assembled: Vec<Vec<Assembled>> =
+        let assembled: Vec<Vec<Assembled<N>>> =
             (lists..lists + cells).into_par_iter().map(|index| assemble_cell(problem, weights, index)).collect();
         for Assembled { element, right, diagonal, seen, .. } in assembled.into_iter().flatten() {
             for (layers, (right, diagonal)) in element.layer.iter().zip(right.iter().zip(&diagonal)) {
@@ -190,7 +203,7 @@ where
 }
 
 /// The elements of all sheets of one cell and interval.
-fn assemble_cell<T>(problem: &Problem<'_, T>, weights: &[Vec<Weights>], index: usize) -> Vec<Assembled>
+fn assemble_cell<const N: usize, T>(problem: &Problem<'_, T>, weights: &[Vec<Weights>], index: usize) -> Vec<Assembled<N>>
 where
     T: Fn(usize, u32, &mut Vec<Target>) + Sync,
 {
@@ -202,7 +215,7 @@ where
     let volume = (columns.len() * rows.len() * frames.len()) as f32;
     let patch = |&label: &u8| Patch::new(grid, problem.layers, place, label, [problem.time, problem.space]);
     let patches: Vec<Patch> = list.iter().map(patch).collect();
-    let mut assembled: Vec<Assembled> = patches.iter().map(|patch| Assembled::new(patch, place[0], volume)).collect();
+    let mut assembled: Vec<Assembled<N>> = patches.iter().map(|patch| Assembled::new(patch, place[0], volume)).collect();
     let mut sums = vec![Vec::with_capacity(frames.len()); list.len()];
     let mut targets = Vec::new();
     for (frame, weights) in frames.zip(&weights[place[0]]) {
@@ -210,17 +223,18 @@ where
         (problem.targets)(index, frame, &mut targets);
         let mut targets = targets.chunks_exact(list.len());
         let known: Option<Vec<Values>> = problem.known.map(|known| patches.iter().map(|patch| patch.values(known, weights)).collect());
-        let mut frame_sums = vec![(Sums::default(), Values::default(), [0.0f32; 3]); list.len()];
+        let mut frame_sums = vec![(Sums::<N>::default(), [[0.0f32; 2]; N], [0.0f32; 3]); list.len()];
         grid.each_pixel(frame, place[1], |_, at| {
             let Some(targets) = targets.next() else { return };
             let shares = patch::shares(at);
+            let own: [f32; N] = std::array::from_fn(|value| shares[value]);
             for (sheet, ((sums, right, seen), target)) in frame_sums.iter_mut().zip(targets).enumerate() {
                 let Some(([mut u, mut v], mut weight)) = *target else { continue };
                 if let Some(known) = &known {
                     ([u, v], weight) = (problem.refit)(patch::value(&known[sheet], &shares), [u, v], weight);
                 }
-                sums.add(&shares, weight);
-                for (right, share) in right.iter_mut().zip(shares) {
+                sums.add(&own, weight);
+                for (right, share) in right.iter_mut().zip(own) {
                     right[0] += weight * share * u;
                     right[1] += weight * share * v;
                 }
@@ -238,7 +252,7 @@ where
     assembled
 }
 
-impl Assembled {
+impl<const N: usize> Assembled<N> {
     fn new(patch: &Patch, interval: usize, volume: f32) -> Self {
         let element = Element::new(patch, interval, volume);
         let (shares, mut diagonal) = (element.shares(), [[0.0; 4]; NODES]);
@@ -250,7 +264,7 @@ impl Assembled {
         Self { element, shares, right: [[[0.0; 2]; 4]; NODES], diagonal, seen: [0.0; 3] }
     }
 
-    fn add(&mut self, sums: &Sums, right: &Values, seen: [f32; 3], weights: &Weights) {
+    fn add(&mut self, sums: &Sums<N>, right: &[[f32; 2]; N], seen: [f32; 3], weights: &Weights) {
         if seen[2] == 0.0 {
             return;
         }
@@ -273,14 +287,14 @@ impl Assembled {
 }
 
 /// Elements side by side, and the layers that they have.
-struct Run<'e> {
-    elements: &'e [Element],
+struct Run<'e, const N: usize> {
+    elements: &'e [Element<N>],
     layers: Range<usize>,
 }
 
 /// The elements in runs of their order, which is that of their layers but for those that a looping path begins and ends with.
-fn runs(elements: &[Element]) -> Vec<Run<'_>> {
-    let of = |elements: &[Element]| {
+fn runs<const N: usize>(elements: &[Element<N>]) -> Vec<Run<'_, N>> {
+    let of = |elements: &[Element<N>]| {
         let layers = elements.iter().flat_map(|element| element.layer.as_flattened()).filter(|&&layer| layer != NOWHERE);
         let (first, end) = layers.fold((usize::MAX, 0), |(first, end), &layer| (first.min(layer as usize), end.max(layer as usize + 1)));
         first..end
@@ -290,8 +304,8 @@ fn runs(elements: &[Element]) -> Vec<Run<'_>> {
 }
 
 /// y = A x: runs of elements side by side, each in a fixed order, added up in a fixed order: the same sums on any number of threads.
-fn multiply(runs: &[Run<'_>], weights: &[Vec<Weights>], x: &[[f64; 2]], y: &mut [[f64; 2]]) {
-    let product = |run: &Run<'_>| {
+fn multiply<const N: usize>(runs: &[Run<'_, N>], weights: &[Vec<Weights>], x: &[[f32; 2]], y: &mut [[f64; 2]]) {
+    let product = |run: &Run<'_, N>| {
         let mut y = vec![[0.0; 2]; run.layers.end];
         run.elements.iter().for_each(|element| element.multiply(&weights[element.interval as usize], x, &mut y));
         y

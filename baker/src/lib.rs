@@ -3,6 +3,7 @@
 //! ```text
 //! scene file -> Scene -> G-buffer -> charts, source image -> sheets -> fitted layers -> coded keys -> bytes
 //! ```
+mod around;
 pub mod atlas;
 pub mod bake;
 pub mod camera;

@@ -133,6 +133,7 @@ impl KeyGrid {
 
     /// Calls `f` with the index into the G-buffer and the position in the cell (across and down, 0..1) of every pixel
     /// that a cell shows in `frame`.
+    #[inline]
     pub fn each_pixel(&self, frame: u32, cell: usize, mut f: impl FnMut(usize, [f32; 2])) {
         let [columns, rows] = self.pixels(cell);
         let scale = 1.0 / (1u32 << self.grid.log2) as f32;
