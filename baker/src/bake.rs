@@ -6,14 +6,15 @@ use crate::cast::Cast;
 use crate::causes::{self, Causes};
 use crate::chart;
 use crate::encode::{self, CodingSettings, Content};
+use crate::fit::{self, Fit};
 use crate::folds::{self, Folded};
 use crate::gbuffer::Lens;
 use crate::planes::{self, FlatChart};
 use crate::scene::Scene;
-use crate::sheets::{self, KeyGrid, Layers};
+use crate::sheets::{self, KeyGrid, Layers, Sheets};
 use crate::verify::VerifyError;
 use crate::walls;
-use crate::{cuts, fit, order, prune, settle, spare, tears, timing};
+use crate::{cuts, order, prune, settle, spare, tears, timing};
 use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC};
 use std::time::Instant;
 use thiserror::Error;
@@ -227,11 +228,24 @@ fn part(done: u64, total: u64) -> f64 {
     done as f64 / total.max(1) as f64
 }
 
-/// Fits and codes the keys, and puts the bundle together.
+/// Sheets of a scene and where they lie in the source image: all that a bundle has but what settles which sheet shows where.
+pub struct Fitted {
+    grid: KeyGrid,
+    folded: Folded,
+    sheets: Sheets,
+    layers: Layers,
+    fit: Fit,
+    charts: Vec<Option<FlatChart>>,
+    lenses: Vec<Lens>,
+    torn_by_cause: Causes,
+    seconds: f64,
+}
+
+/// Finds the sheets and fits their positions: nothing that depends on the outline of the source image.
 ///
 /// # Errors
-/// [`BakeError`] where the settings are out of range or the scene exceeds what a bundle holds.
-pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progress<'_>) -> Result<Encoded, BakeError> {
+/// [`BakeError`] where the settings are out of range.
+pub fn fitted(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progress<'_>) -> Result<Fitted, BakeError> {
     if !matches!(settings.cell, 4 | 8 | 16 | 32) {
         return Err(BakeError::Cell(settings.cell));
     }
@@ -239,20 +253,19 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
         return Err(BakeError::KeyInterval(settings.key_interval));
     }
     let start = Instant::now();
-    let Atlas { image, gbuffer, .. } = &flat.atlas;
+    let Atlas { image, gbuffer: exact, .. } = &flat.atlas;
     let cell_log2 = settings.cell.trailing_zeros() as u8;
-    let grid = KeyGrid::new(gbuffer, cell_log2, settings.key_interval, scene.playback.looping, [settings.time, settings.space]);
-    let adapted = if settings.adapt_keys { timing::place(gbuffer, &grid) } else { None };
+    let grid = KeyGrid::new(exact, cell_log2, settings.key_interval, scene.playback.looping, [settings.time, settings.space]);
+    let adapted = if settings.adapt_keys { timing::place(exact, &grid) } else { None };
     let grid = adapted.map_or(grid.clone(), |keys| grid.with_keys(keys));
-    let cut = if settings.adapt_keys { cuts::keys(gbuffer, &grid) } else { None };
+    let cut = if settings.adapt_keys { cuts::keys(exact, &grid) } else { None };
     let grid = cut.map_or(grid.clone(), |keys| grid.with_keys(keys));
     // In small cells and short intervals a few pixels are much.
     let volume = settings.cell * settings.cell * settings.key_interval;
     let least = if volume < 512 { settings.least_pixels.min(volume / 64).max(1) } else { settings.least_pixels };
     progress("finding sheets", 0.0);
-    let Folded { gbuffer, labels, stands_for } = folds::unfold(gbuffer, &flat.tears, &grid, &image.labels, least.saturating_mul(2));
-    let exact = &flat.atlas.gbuffer;
-    let (gbuffer, image) = (&gbuffer, &SourceImage { labels, ..image.clone() });
+    let folded = folds::unfold(exact, &flat.tears, &grid, &image.labels, least.saturating_mul(2));
+    let gbuffer = &folded.gbuffer;
     let mut sheets = sheets::find(gbuffer, &grid, least);
     if settings.error > 0.0 {
         prune::prune(&mut sheets, gbuffer, image, &grid, settings.error);
@@ -260,12 +273,24 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let torn_by_cause = causes::count(exact, &flat.tears, &flat.seams, &grid, &sheets);
     let layers = Layers::of(&grid, &sheets);
     progress("fitting keys", 0.2);
-    let charts: Vec<Option<FlatChart>> = stands_for.iter().map(|&label| flat.planes[usize::from(label)]).collect();
+    let charts: Vec<Option<FlatChart>> = folded.stands_for.iter().map(|&label| flat.planes[usize::from(label)]).collect();
     let lenses: Vec<Lens> = grid.keys.iter().map(|&frame| Lens::new(scene, frame)).collect();
     let fit = fit::solve(gbuffer, &grid, &sheets, &layers, &planes::positions(&charts, &layers, &lenses, &grid));
+    Ok(Fitted { grid, folded, sheets, layers, fit, charts, lenses, torn_by_cause, seconds: start.elapsed().as_secs_f64() })
+}
+
+/// Settles which of the `fitted` sheets shows where, codes the keys, and puts the bundle together; `settings` are those of the fit.
+///
+/// # Errors
+/// [`BakeError`] where the scene exceeds what a bundle holds.
+pub fn settled(scene: &Scene, flat: &Flat, fitted: &Fitted, settings: &Settings, progress: Progress<'_>) -> Result<Encoded, BakeError> {
+    let start = Instant::now();
+    let Fitted { grid, folded: Folded { gbuffer, labels, .. }, layers, fit, charts, lenses, torn_by_cause, .. } = fitted;
+    let image = &SourceImage { labels: labels.clone(), ..flat.atlas.image.clone() };
+    let mut sheets = fitted.sheets.clone();
     progress("fitting outlines", 0.5);
     let &Settings { field_price, coverage, .. } = settings;
-    let evidence = order::Evidence { gbuffer, grid: &grid, image, layers: &layers, fit: &fit, field_price, coverage };
+    let evidence = order::Evidence { gbuffer, grid, image, layers, fit, field_price, coverage };
     let fields = settle::settle(&evidence, &mut sheets);
     progress("coding keys", 0.8);
     let choice = settings.atlas.charts;
@@ -273,9 +298,8 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let info =
         if choice.rewarped || choice.tried().next().is_some() { format!("{}; {}", scene.name, reason()) } else { scene.name.clone() };
     let header = encode::Header { storage: settings.atlas.storage, fps: scene.playback.fps, info: &info };
-    let (planes, cameras) = planes::records(&charts, &layers.by_label(image.labels.len()), &lenses, &grid);
-    let content =
-        Content { grid: &grid, image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields, planes: &planes, cameras: &cameras };
+    let (planes, cameras) = planes::records(charts, &layers.by_label(image.labels.len()), lenses, grid);
+    let content = Content { grid, image, sheets: &sheets, layers, fit, fields: &fields, planes: &planes, cameras: &cameras };
     let code = |coding: CodingSettings| -> Result<Vec<u8>, BakeError> { Ok(encode::bundle(&content, coding, header)?) };
     let bundle = match settings.sparing {
         Sparing::Nothing => code(settings.coding)?,
@@ -283,5 +307,14 @@ pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
         Sparing::Within(bytes) => spare::within(bytes, |lambda| code(settings.coding.worth(lambda)))?,
     };
     progress("coding keys", 1.0);
-    Ok(Encoded { bundle, grid, dropped_pixels: sheets.dropped, torn_by_cause, seconds: start.elapsed().as_secs_f64() })
+    let seconds = fitted.seconds + start.elapsed().as_secs_f64();
+    Ok(Encoded { bundle, grid: grid.clone(), dropped_pixels: sheets.dropped, torn_by_cause: *torn_by_cause, seconds })
+}
+
+/// Fits and codes the keys, and puts the bundle together.
+///
+/// # Errors
+/// Those of [`fitted`] and [`settled`].
+pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progress<'_>) -> Result<Encoded, BakeError> {
+    settled(scene, flat, &fitted(scene, flat, settings, progress)?, settings, progress)
 }

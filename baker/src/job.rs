@@ -232,35 +232,41 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
     let paint_start = Instant::now();
     let painter = (!options.plain).then(|| Painter::new(&cast, progress));
     let paint_seconds = paint_start.elapsed().as_secs_f64();
-    let Chosen { mut flat, encoded, settings, search_seconds, warnings } = match options.goal {
+    let (chosen, fitted) = match options.goal {
         Goal::AsSet => {
             let flat = bake::flatten_cast(&cast, &settings.atlas, progress)?;
             something_seen(&flat)?;
-            let encoded = bake::encode(scene, &flat, &settings, progress)?;
-            Chosen { flat, encoded, settings, search_seconds: 0.0, warnings: Vec::new() }
+            let fitted = bake::fitted(scene, &flat, &settings, progress)?;
+            let encoded = bake::settled(scene, &flat, &fitted, &settings, progress)?;
+            (Chosen { flat, encoded, settings, search_seconds: 0.0, warnings: Vec::new() }, Some(fitted))
         }
-        goal => tune::search((&cast, painter.as_ref()), options, goal, whole, progress)?,
+        goal => (tune::search((&cast, painter.as_ref()), options, goal, whole, progress)?, None),
     };
+    let Chosen { mut flat, encoded, settings, search_seconds, warnings } = chosen;
     // Large, and of no more use.
     drop(cast);
     let finer_start = Instant::now();
     let quality = verify::briefly(&encoded.bundle, &flat.atlas.image, &flat.atlas.gbuffer)?;
     let free = options.goal == Goal::AsSet && options.cell.is_none() && options.key_interval.is_none();
     let made = Made { settings, encoded, quality };
-    let (made, outlines) = outlines::choose(scene, &mut flat, made, progress)?;
+    // Where something is searched for, the source image has no others.
+    let (made, outlines) = match fitted {
+        Some(fitted) => outlines::choose(scene, &mut flat, &fitted, made, progress)?,
+        None => (made, Vec::new()),
+    };
     let all = made.quality;
     // Searches have left out what they could.
     let prunes = !options.all_sheets && options.goal == Goal::AsSet;
     let made = if prunes { fewer::choose(scene, &flat, made, progress)? } else { made };
-    let (made, other) =
-        if free { finer::choose(scene, &flat, made, &all, &Seen::new(tracer, painter.as_ref()), progress)? } else { (made, None) };
+    let seen = Seen::new(tracer, painter.as_ref());
+    let (made, other) = if free { finer::choose(scene, &flat, made, &all, &seen, progress)? } else { (made, None) };
     let bends = options.goal == Goal::AsSet && options.space.is_none();
     let (made, spaces) = if bends { straight::choose(scene, &flat, made, progress)? } else { (made, Vec::new()) };
     // In other cells what a sheet has to save is another thing.
     let mut made = if prunes && other.is_some() { fewer::anew(scene, &flat, made, progress)? } else { made };
     let finer = other.map(|other| other.said(&made));
     let (search_seconds, paint_start) = (search_seconds + finer_start.elapsed().as_secs_f64(), Instant::now());
-    let repainted = painter.map_or(Ok(false), |painter| painter.repaint(&mut made, &mut flat.atlas, options.goal))?;
+    let repainted = painter.as_ref().map_or(Ok(false), |painter| painter.repaint(&mut made, &mut flat.atlas, options.goal))?;
     let (paint_seconds, verify_start) = (paint_seconds + paint_start.elapsed().as_secs_f64(), Instant::now());
     let Made { settings, encoded, .. } = made;
     let part = |done: u32, total: u32| f64::from(done) / f64::from(total.max(1));
@@ -278,7 +284,7 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
     } else {
         progress("comparing with the truth", 0.0);
         let bar = |d, n| progress("comparing with the truth", part(d, n));
-        Some(verify::against_truth(&encoded.bundle, &Truth::by(tracer.of(scene)), &frames, &bar)?)
+        Some(verify::against_truth(&encoded.bundle, &Truth::by(tracer.of(scene)), &frames, seen.rendered(), &bar)?)
     };
     let seconds = Seconds {
         total: options.load_seconds + tracer.seconds + start.elapsed().as_secs_f64(),

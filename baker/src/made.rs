@@ -1,6 +1,6 @@
 //! A bundle as choices weigh it: what made it, how good it is, and what it costs. `job` makes the usual one; `finer` and `straight` make others.
 
-use crate::bake::{self, BakeError, Encoded, Flat, Settings};
+use crate::bake::{self, BakeError, Encoded, Fitted, Flat, Settings};
 use crate::encode::image_bytes;
 use crate::metrics;
 use crate::report::grouped;
@@ -21,7 +21,15 @@ impl Made {
     /// # Errors
     /// Those of encoding, and of the player.
     pub fn new(scene: &Scene, flat: &Flat, settings: Settings) -> Result<Self, BakeError> {
-        let encoded = bake::encode(scene, flat, &settings, &|_, _| {})?;
+        Self::of(scene, flat, &bake::fitted(scene, flat, &settings, &|_, _| {})?, settings)
+    }
+
+    /// What the same make of sheets that are `fitted` already.
+    ///
+    /// # Errors
+    /// The same.
+    pub fn of(scene: &Scene, flat: &Flat, fitted: &Fitted, settings: Settings) -> Result<Self, BakeError> {
+        let encoded = bake::settled(scene, flat, fitted, &settings, &|_, _| {})?;
         let quality = verify::briefly(&encoded.bundle, &flat.atlas.image, &flat.atlas.gbuffer)?;
         Ok(Self { settings, encoded, quality })
     }

@@ -2,7 +2,7 @@
 //! each way may show more for the bytes. A bundle baked as usual comes from `job`; the best goes back. Lattices and foliage gain 1 to 3 dB.
 
 use crate::atlas::Outline;
-use crate::bake::{BakeError, Flat, Progress};
+use crate::bake::{BakeError, Fitted, Flat, Progress};
 use crate::finer;
 use crate::made::Made;
 use crate::metrics;
@@ -33,10 +33,17 @@ impl Trial {
 }
 
 /// `usual`, or what is made of the scene with a finer outline if that is worth more, which `flat` then has; and all that were tried, the finest last.
+/// `fitted`: what `usual` came from.
 ///
 /// # Errors
 /// Those of encoding, and of the player.
-pub(crate) fn choose(scene: &Scene, flat: &mut Flat, usual: Made, progress: Progress<'_>) -> Result<(Made, Vec<Trial>), BakeError> {
+pub(crate) fn choose(
+    scene: &Scene,
+    flat: &mut Flat,
+    fitted: &Fitted,
+    usual: Made,
+    progress: Progress<'_>,
+) -> Result<(Made, Vec<Trial>), BakeError> {
     let finer = std::mem::take(&mut flat.atlas.finer);
     if finer.is_empty() || !finer::crossed(&usual.quality) {
         return Ok((usual, Vec::new()));
@@ -48,7 +55,7 @@ pub(crate) fn choose(scene: &Scene, flat: &mut Flat, usual: Made, progress: Prog
         let mut settings = best.2.settings;
         settings.atlas.outline = Some(outline.finer);
         flat.atlas.image.outline = outline.clone();
-        let made = Made::new(scene, flat, settings)?;
+        let made = Made::of(scene, flat, fitted, settings)?;
         let trial = Trial::new(&outline, &made);
         if trial.worth() > best.0 {
             best = (trial.worth(), outline, made);
@@ -82,8 +89,9 @@ mod tests {
         let mut scene = builtin::build(name).unwrap();
         (scene.playback.width, scene.playback.height, scene.playback.frames) = (64, 48, 17);
         let mut flat = bake::flatten(&scene, &settings.atlas, &|_, _| {}).unwrap();
-        let usual = Made::new(&scene, &flat, settings).unwrap();
-        let (made, trials) = choose(&scene, &mut flat, usual, &|_, _| {}).unwrap();
+        let fitted = bake::fitted(&scene, &flat, &settings, &|_, _| {}).unwrap();
+        let usual = Made::of(&scene, &flat, &fitted, settings).unwrap();
+        let (made, trials) = choose(&scene, &mut flat, &fitted, usual, &|_, _| {}).unwrap();
         (flat.atlas.image.outline.finer, flat, made, trials)
     }
 

@@ -190,7 +190,7 @@ mod tests {
     /// The mean PSNR against the antialiased scene, all frames.
     fn against_truth(scene: &Scene, made: &Made) -> f64 {
         let frames = spread(scene.playback.frames, u32::MAX);
-        verify::against_truth(&made.encoded.bundle, &Truth::new(scene), &frames, &|_, _| {}).unwrap().psnr_mean
+        verify::against_truth(&made.encoded.bundle, &Truth::new(scene), &frames, &[], &|_, _| {}).unwrap().psnr_mean
     }
 
     #[test]

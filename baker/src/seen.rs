@@ -43,6 +43,11 @@ impl<'a> Seen<'a> {
         Ok(metrics::worth(psnr, bundle.len().saturating_sub(picture) as u64, DOUBLE))
     }
 
+    /// What was rendered of the scene: which frames, and R, G, B, row by row.
+    pub fn rendered(&self) -> &[(u32, Vec<u8>)] {
+        self.pictures.get().map_or(&[], Vec::as_slice)
+    }
+
     fn pictures(&self) -> &[(u32, Vec<u8>)] {
         self.pictures.get_or_init(|| Truth::by(self.tracer.of(self.tracer.scene())).frames(COMPARED))
     }

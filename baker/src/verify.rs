@@ -12,6 +12,7 @@ use cubist_core::fixed::{PLAY_BITS, PlayUv};
 use cubist_core::{AnyTexels, Bundle, Frame, Player, Probe};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Instant;
 use thiserror::Error;
@@ -372,7 +373,8 @@ impl Sums {
     }
 }
 
-/// Compares the frames `frames` of a finished bundle with the scene itself. `progress` hears (frames done, frames in all).
+/// Compares the frames `frames` of a finished bundle with the scene itself; those that are `rendered` already, which frame and R, G, B, row by row, are
+/// not again. `progress` hears (frames done, frames in all).
 ///
 /// # Errors
 /// [`VerifyError`] where the player refuses the bytes.
@@ -380,37 +382,42 @@ pub fn against_truth(
     bytes: &[u8],
     truth: &Truth<'_>,
     frames: &[u32],
+    rendered: &[(u32, Vec<u8>)],
     progress: &(dyn Fn(u32, u32) + Sync),
 ) -> Result<TruthQuality, VerifyError> {
     let bundle = Bundle::parse(bytes)?;
     let width = bundle.size().0 as usize;
-    let (mut psnr, mut others, mut ssim) = (0.0, [0.0; 4], 0.0);
-    with_screen(&bundle, |mut screen| {
-        let mut played = Vec::new();
-        for (done, &frame) in (1..).zip(frames) {
-            let exact = truth.frame(frame);
+    let done = AtomicU32::new(0);
+    // PSNR as frames are, PSNR as others draw them, and SSIM.
+    let compared = |&frame: &u32| -> Result<(f64, [f64; 4], f64), VerifyError> {
+        let known = rendered.iter().find(|&&(at, _)| at == frame);
+        let exact = known.map_or_else(|| Cow::from(truth.frame(frame)), |(_, picture)| Cow::from(picture));
+        let found = with_screen(&bundle, |mut screen| {
+            let mut played = Vec::new();
+            let psnr = |played: &[u8]| metrics::psnr(metrics::mean_squared_error(played, &exact));
             screen.play(frame, &mut played);
-            psnr += metrics::psnr(metrics::mean_squared_error(&played, &exact));
-            ssim += metrics::ssim(&played, &exact, width);
+            let (plain, ssim) = (psnr(&played), metrics::ssim(&played, &exact, width));
             let ways: [Row<'_>; 4] = [Player::smooth_row, Player::dithered_row, Player::bilinear_row, Player::fine_row];
-            for (sum, row) in others.iter_mut().zip(ways) {
+            let others = ways.map(|row| {
                 screen.draw(&mut played, row);
-                *sum += metrics::psnr(metrics::mean_squared_error(&played, &exact));
-            }
-            progress(done, frames.len() as u32);
-        }
-    })?;
-    let count = frames.len().max(1) as f64;
+                psnr(&played)
+            });
+            (plain, others, ssim)
+        })?;
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1, frames.len() as u32);
+        Ok(found)
+    };
+    let all: Vec<_> = frames.par_iter().map(compared).collect::<Result<_, _>>()?;
+    let count = all.len().max(1) as f64;
+    let (mut psnr_mean, mut others, mut ssim_mean) = (0.0, [0.0; 4], 0.0);
+    for (plain, ways, ssim) in all {
+        psnr_mean += plain;
+        others.iter_mut().zip(ways).for_each(|(sum, psnr)| *sum += psnr);
+        ssim_mean += ssim;
+    }
     let [psnr_smooth, psnr_dithered, psnr_bilinear, psnr_fine] = others.map(|sum| sum / count);
-    Ok(TruthQuality {
-        psnr_mean: psnr / count,
-        psnr_smooth,
-        psnr_dithered,
-        psnr_bilinear,
-        psnr_fine,
-        ssim_mean: ssim / count,
-        truth_frames: frames.len() as u32,
-    })
+    let (psnr_mean, ssim_mean) = (psnr_mean / count, ssim_mean / count);
+    Ok(TruthQuality { psnr_mean, psnr_smooth, psnr_dithered, psnr_bilinear, psnr_fine, ssim_mean, truth_frames: frames.len() as u32 })
 }
 
 /// The mean PSNR, dB, of a finished bundle's frames against these `pictures` of the scene: which frame, and R, G, B, row by row.
@@ -418,14 +425,16 @@ pub fn against_truth(
 /// # Errors
 /// [`VerifyError`] where the player refuses the bytes.
 pub(crate) fn against_pictures(bytes: &[u8], pictures: &[(u32, Vec<u8>)]) -> Result<f64, VerifyError> {
-    let (mut psnr, mut played) = (0.0, Vec::new());
-    with_screen(&Bundle::parse(bytes)?, |mut screen| {
-        for (frame, exact) in pictures {
+    let bundle = Bundle::parse(bytes)?;
+    let compared = |(frame, exact): &(u32, Vec<u8>)| {
+        with_screen(&bundle, |mut screen| {
+            let mut played = Vec::new();
             screen.play(*frame, &mut played);
-            psnr += metrics::psnr(metrics::mean_squared_error(&played, exact));
-        }
-    })?;
-    Ok(psnr / pictures.len().max(1) as f64)
+            metrics::psnr(metrics::mean_squared_error(&played, exact))
+        })
+    };
+    let all: Vec<f64> = pictures.par_iter().map(compared).collect::<Result<_, _>>()?;
+    Ok(all.iter().sum::<f64>() / all.len().max(1) as f64)
 }
 
 /// Bytes of working memory that a player of a bundle asks for.
