@@ -12,7 +12,6 @@ use crate::sheets::{KeyGrid, Layers, Sheets};
 use cubist_core::format::{MAX_SHEETS, SPACE_LINEAR, TIME_LINEAR};
 use cubist_core::lists::{BOTH, CHART, FIELD};
 use rayon::prelude::*;
-use std::collections::BTreeMap;
 
 /// Up to this many sheets every order is tried; more are ordered greedily, front to back.
 const EXHAUSTIVE: usize = 5;
@@ -114,7 +113,7 @@ fn observe(evidence: &Evidence<'_>, fields: Option<&Fields>, index: usize, list:
     let (interval, cell) = (index / cells, index % cells);
     let patches = |ways| -> Vec<Patch> { list.iter().map(|&label| Patch::new(grid, layers, [interval, cell], label, ways)).collect() };
     let (position_patches, field_patches) = (patches([grid.time, grid.space]), patches([TIME_LINEAR, SPACE_LINEAR]));
-    let mut seen: BTreeMap<(usize, u32), [Cost; MAX_SHEETS]> = BTreeMap::new();
+    let mut seen = Seen::default();
     for frame in grid.frames_of(interval) {
         let weights = grid.weights(interval, frame, grid.time);
         let linear = grid.weights(interval, frame, TIME_LINEAR);
@@ -142,11 +141,33 @@ fn observe(evidence: &Evidence<'_>, fields: Option<&Fields>, index: usize, list:
                     covering |= u32::from(inside) << (16 + place);
                 }
             }
-            let sums = seen.entry((sheet, covering)).or_default();
+            let sums = seen.group(sheet, covering);
             sums.iter_mut().zip(costs).for_each(|(sum, cost)| *sum += Cost::from(cost));
         });
     }
-    seen.into_iter().map(|((sheet, covering), cost)| Group { sheet, covering, cost }).collect()
+    seen.groups
+}
+
+/// Groups of pixels, as they come.
+#[derive(Default)]
+struct Seen {
+    groups: Vec<Group>,
+    /// That of the pixel before: most see what their neighbours see.
+    last: usize,
+}
+
+impl Seen {
+    /// The costs of the group of such pixels.
+    fn group(&mut self, sheet: usize, covering: u32) -> &mut [Cost; MAX_SHEETS] {
+        let same = |group: &Group| group.sheet == sheet && group.covering == covering;
+        if !self.groups.get(self.last).is_some_and(same) {
+            self.last = self.groups.iter().position(same).unwrap_or(self.groups.len());
+            if self.last == self.groups.len() {
+                self.groups.push(Group { sheet, covering, cost: [0; MAX_SHEETS] });
+            }
+        }
+        &mut self.groups[self.last].cost
+    }
 }
 
 /// What it costs to show a colour of a wrong sheet.
