@@ -136,9 +136,8 @@ impl<'a> Outlines<'a> {
         let reach = REACH * (1u32 << grid.grid.log2) as f32;
         let around = Around::new(gbuffer, grid, list, reach as usize, frame, index % grid.grid.cells());
         for (sheet, &label) in list.iter().enumerate().filter(|&(sheet, _)| !tested || tests_field(self.sheets, index, sheet)) {
-            let steps = around.steps(sheet as u8);
-            targets.resize(steps.len() * list.len(), None);
-            for ((pixel, shown), steps) in around.shown().enumerate().zip(&steps) {
+            targets.resize(around.shown().count() * list.len(), None);
+            for ((pixel, shown), steps) in around.shown().enumerate().zip(around.steps(sheet as u8)) {
                 // What is hidden by a sheet further in front does not matter, nor what no sheet shows.
                 if shown == NONE || usize::from(shown) < sheet {
                     continue;
