@@ -112,10 +112,11 @@ pub(crate) fn choose(
 ) -> Result<(Made, Option<Other>), BakeError> {
     let Some((climbs, why)) = climbs(usual.settings.cell, all) else { return Ok((usual, None)) };
     let picture = usual.picture(flat);
-    let (exact, visible) = (usual.worth(picture), seen.worth(&usual, flat, picture)?);
+    // What is seen is told where it is asked for: the scene has to be rendered for it.
+    let (exact, mut visible) = (usual.worth(picture), None);
     let time = if all.path_error_texels.p99 < BENT { TIME } else { 0.0 };
     // By how much `made` is worth more than the usual one.
-    let gained = |made: &Made| -> Result<f64, BakeError> {
+    let mut gained = |made: &Made| -> Result<f64, BakeError> {
         let [before, after] = [&usual, made].map(|made| made.quality.wrong_surface_percent);
         let keys = made.settings.key_interval.cmp(&usual.settings.key_interval);
         if keys == Ordering::Greater && all.wrong_surface_percent < TORN && after > FLICKER * before {
@@ -125,7 +126,11 @@ pub(crate) fn choose(
         if made.settings.cell != usual.settings.cell {
             return Ok(exact);
         }
-        gain(keys, exact, time, || seen.worth(made, flat, picture).map(|worth| worth - visible))
+        gain(keys, exact, time, || {
+            let before = visible.map_or_else(|| seen.worth(&usual, flat, picture), Ok)?;
+            visible = Some(before);
+            Ok(seen.worth(made, flat, picture)? - before)
+        })
     };
     let free = Free { cell: true, interval: true, lambda: false, time: false, space: false, frames: scene.playback.frames };
     let mut better: Option<(f64, Made)> = None;

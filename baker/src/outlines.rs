@@ -32,8 +32,8 @@ impl Trial {
     }
 }
 
-/// `usual`, or what is made of the scene with a finer outline if that is worth more, which `flat` then has; and all that were tried, the finest last.
-/// `fitted`: what `usual` came from.
+/// `usual`, or what is made of the scene with a finer outline if that is worth more, which `flat` then has; and all that were tried, the finest last:
+/// one that is worth less than the one before is the last. `fitted`: what `usual` came from.
 ///
 /// # Errors
 /// Those of encoding, and of the player.
@@ -57,10 +57,14 @@ pub(crate) fn choose(
         flat.atlas.image.outline = outline.clone();
         let made = Made::of(scene, flat, fitted, settings)?;
         let trial = Trial::new(&outline, &made);
-        if trial.worth() > best.0 {
+        let better = trial.worth() > best.0;
+        if better {
             best = (trial.worth(), outline, made);
         }
         trials.push(trial);
+        if !better {
+            break;
+        }
     }
     progress("trying outlines", 1.0);
     let (_, outline, made) = best;
