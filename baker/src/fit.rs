@@ -6,7 +6,7 @@
 
 use crate::element::{self, Element, NOWHERE, Sums, Weights};
 use crate::gbuffer::GBuffer;
-use crate::patch::{self, CORNERS, NODES, Patch, VALUES, Values};
+use crate::patch::{self, CORNERS, NODES, Patch, VALUES};
 use crate::sheets::{KeyGrid, Layers, Sheets};
 use cubist_core::format::SPACE_LINEAR;
 use rayon::prelude::*;
@@ -222,19 +222,20 @@ where
         targets.clear();
         (problem.targets)(index, frame, &mut targets);
         let mut targets = targets.chunks_exact(list.len());
-        let known: Option<Vec<Values>> = problem.known.map(|known| patches.iter().map(|patch| patch.values(known, weights)).collect());
+        let known: Option<Vec<[[f32; 2]; N]>> =
+            problem.known.map(|known| patches.iter().map(|patch| patch.values_of(known, weights)).collect());
         let mut frame_sums = vec![(Sums::<N>::default(), [[0.0f32; 2]; N], [0.0f32; 3]); list.len()];
         grid.each_pixel(frame, place[1], |_, at| {
             let Some(targets) = targets.next() else { return };
-            let shares = patch::shares(at);
-            let own: [f32; N] = std::array::from_fn(|value| shares[value]);
+            let all = patch::shares(at);
+            let shares: [f32; N] = std::array::from_fn(|value| all[value]);
             for (sheet, ((sums, right, seen), target)) in frame_sums.iter_mut().zip(targets).enumerate() {
                 let Some(([mut u, mut v], mut weight)) = *target else { continue };
                 if let Some(known) = &known {
                     ([u, v], weight) = (problem.refit)(patch::value(&known[sheet], &shares), [u, v], weight);
                 }
-                sums.add(&own, weight);
-                for (right, share) in right.iter_mut().zip(own) {
+                sums.add(&shares, weight);
+                for (right, share) in right.iter_mut().zip(shares) {
                     right[0] += weight * share * u;
                     right[1] += weight * share * v;
                 }

@@ -7,8 +7,8 @@ use crate::bake::Coverage;
 use crate::fields::Fields;
 use crate::fit::Fit;
 use crate::gbuffer::GBuffer;
-use crate::patch::{self, Patch, Values};
-use crate::sheets::{KeyGrid, Layers, Sheets};
+use crate::patch::{self, CORNERS, Patch, Values};
+use crate::sheets::{KeyGrid, Layers, Sheets, bilinear};
 use cubist_core::format::{MAX_SHEETS, SPACE_LINEAR, TIME_LINEAR};
 use cubist_core::lists::{BOTH, CHART, FIELD};
 use rayon::prelude::*;
@@ -113,33 +113,33 @@ fn observe(evidence: &Evidence<'_>, fields: Option<&Fields>, index: usize, list:
     let (interval, cell) = (index / cells, index % cells);
     let patches = |ways| -> Vec<Patch> { list.iter().map(|&label| Patch::new(grid, layers, [interval, cell], label, ways)).collect() };
     let (position_patches, field_patches) = (patches([grid.time, grid.space]), patches([TIME_LINEAR, SPACE_LINEAR]));
+    let charts: Vec<Chart> = list.iter().map(|&label| Chart::new(image, label)).collect();
+    let strips: Vec<bool> = list.iter().map(|&label| fields.is_some_and(|fields| fields.strip(label))).collect();
     let mut seen = Seen::default();
     for frame in grid.frames_of(interval) {
         let weights = grid.weights(interval, frame, grid.time);
         let linear = grid.weights(interval, frame, TIME_LINEAR);
-        let values = |patches: &[Patch], of: &[[f32; 2]], weights: &[[f32; 4]; 4]| -> Vec<Values> {
-            patches.iter().map(|patch| patch.values(of, weights)).collect()
-        };
-        let positions = values(&position_patches, &fit.uv, &weights);
-        let distances = fields.map(|fields| values(&field_patches, &fields.distance, &linear));
+        let positions: Vec<Values> = position_patches.iter().map(|patch| patch.values(&fit.uv, &weights)).collect();
+        // Fields do not bend.
+        let of = |fields: &Fields| field_patches.iter().map(|patch| patch.values_of(&fields.distance, &linear)).collect();
+        let distances: Vec<[[f32; 2]; CORNERS.len()]> = fields.map(of).unwrap_or_default();
         grid.each_pixel(frame, cell, |pixel, at| {
             let sheet = list.iter().position(|&label| u16::from(label) == gbuffer.label[pixel]).unwrap_or(NO_SHEET);
             let right = image.colour_at(gbuffer.uv[pixel]);
             let mut costs = [0; MAX_SHEETS];
             let shares = patch::shares(at);
-            let mix = |values: &Values| patch::value(values, &shares);
             let mut covering = 0u32;
-            for (place, &label) in list.iter().enumerate() {
-                let uv = mix(&positions[place]);
-                covering |= u32::from(covers(image, label, uv)) << place;
+            for (place, (values, chart)) in positions.iter().zip(&charts).enumerate() {
+                let uv = patch::value(values, &shares);
+                covering |= u32::from(chart.covers(image, uv)) << place;
                 if place != sheet {
                     costs[place] = cost(right, image.colour_at(uv));
                 }
-                if let Some((fields, distances)) = fields.zip(distances.as_ref()) {
-                    let [a, b]: [f32; 2] = mix(&distances[place]);
-                    let inside = a > 0.0 && (!fields.strip(label) || b > 0.0);
-                    covering |= u32::from(inside) << (16 + place);
-                }
+            }
+            let shares = bilinear(at);
+            for (place, (values, &strip)) in distances.iter().zip(&strips).enumerate() {
+                let [a, b] = patch::value(values, &shares);
+                covering |= u32::from(a > 0.0 && (!strip || b > 0.0)) << (16 + place);
             }
             let sums = seen.group(sheet, covering);
             sums.iter_mut().zip(costs).for_each(|(sum, cost)| *sum += Cost::from(cost));
@@ -177,14 +177,23 @@ fn cost(right: [u8; 3], shown: [u8; 3]) -> u32 {
     (HIDDEN + (PIXEL - HIDDEN) * off / PLAIN).min(MOST * PIXEL)
 }
 
-/// The player's chart test.
-fn covers(image: &SourceImage, label: u8, [u, v]: [f32; 2]) -> bool {
-    let label = &image.labels[usize::from(label)];
-    let [left, top, right, bottom] = label.rect.map(f32::from);
-    if !(u >= left && u < right && v >= top && v < bottom) {
-        return false;
+/// The rectangle of a chart, texels, and whether its outline tells more.
+struct Chart {
+    rect: [f32; 4],
+    masked: bool,
+}
+
+impl Chart {
+    fn new(image: &SourceImage, label: u8) -> Self {
+        let label = &image.labels[usize::from(label)];
+        Self { rect: label.rect.map(f32::from), masked: label.masked }
     }
-    !label.masked || image.covered_at([u, v])
+
+    /// The player's chart test.
+    fn covers(&self, image: &SourceImage, [u, v]: [f32; 2]) -> bool {
+        let [left, top, right, bottom] = self.rect;
+        u >= left && u < right && v >= top && v < bottom && (!self.masked || image.covered_at([u, v]))
+    }
 }
 
 /// The tests and the cost of an order: each sheet's test is chosen of `candidates` in turn, front to back.

@@ -96,9 +96,10 @@ pub fn shares([x, y]: [f32; 2]) -> [f32; VALUES] {
     [a, b, c, d, 4.0 * x * (1.0 - x), 4.0 * y * (1.0 - y)]
 }
 
-/// What a patch shows where its `values` have these `shares`.
+/// What a patch shows where its `values` have these `shares`: all of them, or as many as there are in one that does not bend, its corners'.
 #[must_use]
-pub fn value(values: &Values, shares: &[f32; VALUES]) -> [f32; 2] {
+#[inline]
+pub fn value<const N: usize>(values: &[[f32; 2]; N], shares: &[f32; N]) -> [f32; 2] {
     let mut sum = [0.0; 2];
     for (&value, &share) in values.iter().zip(shares) {
         add(&mut sum, share, value);
@@ -135,6 +136,13 @@ impl Patch {
         });
         let present = chains.iter().enumerate().fold(0, |bits, (node, chain)| bits | u32::from(chain.is_some()) << node);
         Self { chains, stencil: Stencil::new(present) }
+    }
+
+    /// The first values of the patch at a moment: those at its corners alone, where it does not bend.
+    #[must_use]
+    pub fn values_of<const N: usize>(&self, of: &[[f32; 2]], weights: &[[f32; 4]; 4]) -> [[f32; 2]; N] {
+        let values = self.values(of, weights);
+        std::array::from_fn(|value| values[value])
     }
 
     /// The patch's values at a moment, given all layers' positions or distances `of` and the keys' weights.
