@@ -4,7 +4,7 @@
 //! This is where baking spends its time. Keys are mixed as patches' values, of which there are half as many as nodes: once an interval the values of
 //! every key, once a frame their mean, and back.
 
-use crate::patch::{AtNodes, CORNERS, NODES, Patch, Stencil, Values};
+use crate::patch::{self, AtNodes, CORNERS, NODES, Patch, Stencil, Values};
 
 /// Weight of the second differences inside a cell, per pixel: keeps sheets that few pixels pin down flat.
 const TWIST: f32 = 1e-4;
@@ -18,7 +18,6 @@ pub const NOWHERE: u32 = u32::MAX;
 pub type Weights = [[f32; 4]; 4];
 
 /// A key of nodes whose keys weigh the same.
-#[derive(Clone, Copy)]
 struct Way {
     /// The set of weights.
     set: u8,
@@ -28,10 +27,13 @@ struct Way {
     layer: [u32; NODES],
 }
 
-/// Ways of an element at most, and as many as most have: all nodes' keys weigh the same.
-const WAYS: [usize; 2] = [16, 4];
+/// Ways of an element at most.
+const MOST_WAYS: usize = 16;
+/// Ways of most elements: all nodes' keys weigh the same.
+const USUAL_WAYS: usize = 4;
 
-/// What one sheet in one cell and interval asks of its layers, where its patch has `N` values: [`patch::VALUES`](crate::patch::VALUES), or no more than [`CORNERS`] where it cannot bend.
+/// What one sheet in one cell and interval asks of its layers, where its patch has `N` values: [`patch::VALUES`](crate::patch::VALUES), or those at its
+/// corners alone where it cannot bend.
 pub struct Element<const N: usize> {
     /// The layers of every node's four keys, [`NOWHERE`] where there is none.
     pub layer: [[u32; 4]; NODES],
@@ -136,12 +138,7 @@ impl<const N: usize> Element<N> {
     /// The patch's values, given its nodes.
     #[inline]
     fn values(&self, nodes: &AtNodes) -> [[f32; 2]; N] {
-        if N == CORNERS.len() {
-            std::array::from_fn(|corner| nodes[CORNERS[corner]])
-        } else {
-            let values = self.stencil.values(nodes);
-            std::array::from_fn(|value| values[value])
-        }
+        if N == CORNERS.len() { std::array::from_fn(|corner| nodes[CORNERS[corner]]) } else { patch::first(&self.stencil.values(nodes)) }
     }
 
     /// What sums over pixels times shares in the patch's values come to at its nodes.
@@ -184,8 +181,8 @@ impl<const N: usize> Element<N> {
     pub fn multiply(&self, weights: &[Weights], x: &[[f32; 2]], y: &mut [[f64; 2]]) {
         match &self.pixels {
             None => (),
-            Some(pixels) if self.ways.len() <= WAYS[1] => self.multiply_pixels::<{ WAYS[1] }>(pixels, weights, x, y),
-            Some(pixels) => self.multiply_pixels::<{ WAYS[0] }>(pixels, weights, x, y),
+            Some(pixels) if self.ways.len() <= USUAL_WAYS => self.multiply_pixels::<USUAL_WAYS>(pixels, weights, x, y),
+            Some(pixels) => self.multiply_pixels::<MOST_WAYS>(pixels, weights, x, y),
         }
         let corner = |bits: usize| self.layer[CORNERS[bits & 3]][1 + (bits >> 2)];
         let held = regularised(self.volume, &std::array::from_fn(|bits| value(x, corner(bits))));
@@ -283,7 +280,7 @@ fn regularised(volume: f32, values: &[[f32; 2]; 8]) -> [[f32; 2]; 8] {
 mod tests {
     use super::*;
     use crate::gbuffer::GBuffer;
-    use crate::patch::{self, VALUES};
+    use crate::patch::VALUES;
     use crate::sheets::{self, KeyGrid, Layers};
     use cubist_core::format::{SPACE_CUBIC, SPACE_LINEAR, TIME_CUBIC, TIME_LINEAR};
 

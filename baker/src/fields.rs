@@ -130,13 +130,14 @@ impl<'a> Outlines<'a> {
     fn targets(&self, index: usize, frame: u32, tested: bool, targets: &mut Vec<Target>) {
         let &Outlines { gbuffer, grid, .. } = self;
         let list = &self.sheets.lists[index];
-        if list.len() < 2 {
+        let asked = || list.iter().enumerate().filter(|&(sheet, _)| !tested || tests_field(self.sheets, index, sheet));
+        if list.len() < 2 || asked().next().is_none() {
             return;
         }
         let reach = REACH * (1u32 << grid.grid.log2) as f32;
         let around = Around::new(gbuffer, grid, list, reach as usize, frame, index % grid.grid.cells());
-        for (sheet, &label) in list.iter().enumerate().filter(|&(sheet, _)| !tested || tests_field(self.sheets, index, sheet)) {
-            targets.resize(around.shown().count() * list.len(), None);
+        targets.resize(around.shown().count() * list.len(), None);
+        for (sheet, &label) in asked() {
             for ((pixel, shown), steps) in around.shown().enumerate().zip(around.steps(sheet as u8)) {
                 // What is hidden by a sheet further in front does not matter, nor what no sheet shows.
                 if shown == NONE || usize::from(shown) < sheet {

@@ -223,12 +223,11 @@ where
         (problem.targets)(index, frame, &mut targets);
         let mut targets = targets.chunks_exact(list.len());
         let known: Option<Vec<[[f32; 2]; N]>> =
-            problem.known.map(|known| patches.iter().map(|patch| patch.values_of(known, weights)).collect());
+            problem.known.map(|known| patches.iter().map(|patch| patch::first(&patch.values(known, weights))).collect());
         let mut frame_sums = vec![(Sums::<N>::default(), [[0.0f32; 2]; N], [0.0f32; 3]); list.len()];
         grid.each_pixel(frame, place[1], |_, at| {
             let Some(targets) = targets.next() else { return };
-            let all = patch::shares(at);
-            let shares: [f32; N] = std::array::from_fn(|value| all[value]);
+            let shares: [f32; N] = patch::first(&patch::shares(at));
             for (sheet, ((sums, right, seen), target)) in frame_sums.iter_mut().zip(targets).enumerate() {
                 let Some(([mut u, mut v], mut weight)) = *target else { continue };
                 if let Some(known) = &known {

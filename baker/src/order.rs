@@ -121,7 +121,7 @@ fn observe(evidence: &Evidence<'_>, fields: Option<&Fields>, index: usize, list:
         let linear = grid.weights(interval, frame, TIME_LINEAR);
         let positions: Vec<Values> = position_patches.iter().map(|patch| patch.values(&fit.uv, &weights)).collect();
         // Fields do not bend.
-        let of = |fields: &Fields| field_patches.iter().map(|patch| patch.values_of(&fields.distance, &linear)).collect();
+        let of = |fields: &Fields| field_patches.iter().map(|patch| patch::first(&patch.values(&fields.distance, &linear))).collect();
         let distances: Vec<[[f32; 2]; CORNERS.len()]> = fields.map(of).unwrap_or_default();
         grid.each_pixel(frame, cell, |pixel, at| {
             let sheet = list.iter().position(|&label| u16::from(label) == gbuffer.label[pixel]).unwrap_or(NO_SHEET);

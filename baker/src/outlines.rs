@@ -57,14 +57,12 @@ pub(crate) fn choose(
         flat.atlas.image.outline = outline.clone();
         let made = Made::of(scene, flat, fitted, settings)?;
         let trial = Trial::new(&outline, &made);
-        let better = trial.worth() > best.0;
-        if better {
-            best = (trial.worth(), outline, made);
-        }
+        let worth = trial.worth();
         trials.push(trial);
-        if !better {
+        if worth <= best.0 {
             break;
         }
+        best = (worth, outline, made);
     }
     progress("trying outlines", 1.0);
     let (_, outline, made) = best;

@@ -96,7 +96,14 @@ pub fn shares([x, y]: [f32; 2]) -> [f32; VALUES] {
     [a, b, c, d, 4.0 * x * (1.0 - x), 4.0 * y * (1.0 - y)]
 }
 
-/// What a patch shows where its `values` have these `shares`: all of them, or as many as there are in one that does not bend, its corners'.
+/// The first ones of a patch's values or their shares: all of them, or those of its corners, which are all that one which does not bend has.
+#[must_use]
+#[inline]
+pub fn first<const N: usize, T: Copy>(all: &[T; VALUES]) -> [T; N] {
+    std::array::from_fn(|value| all[value])
+}
+
+/// What a patch shows where its `values` have these `shares`: all of them, or the [`first`] ones.
 #[must_use]
 #[inline]
 pub fn value<const N: usize>(values: &[[f32; 2]; N], shares: &[f32; N]) -> [f32; 2] {
@@ -136,13 +143,6 @@ impl Patch {
         });
         let present = chains.iter().enumerate().fold(0, |bits, (node, chain)| bits | u32::from(chain.is_some()) << node);
         Self { chains, stencil: Stencil::new(present) }
-    }
-
-    /// The first values of the patch at a moment: those at its corners alone, where it does not bend.
-    #[must_use]
-    pub fn values_of<const N: usize>(&self, of: &[[f32; 2]], weights: &[[f32; 4]; 4]) -> [[f32; 2]; N] {
-        let values = self.values(of, weights);
-        std::array::from_fn(|value| values[value])
     }
 
     /// The patch's values at a moment, given all layers' positions or distances `of` and the keys' weights.
