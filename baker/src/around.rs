@@ -7,7 +7,7 @@ use crate::sheets::KeyGrid;
 /// The place of a pixel that shows none of the labels.
 pub(crate) const NONE: u8 = u8::MAX;
 
-/// Steps to the nearest pixel beyond an outline, on the left, right, up and down; [`Around::distance`] makes distances of them.
+/// Steps to the nearest pixel beyond an outline, on the left, right, up and down; [`distance`] makes distances of them.
 pub(crate) type Steps = [u8; 4];
 
 /// Lines that are walked along at a time.
@@ -19,7 +19,6 @@ pub(crate) struct Around {
     across: Lines,
     /// Its columns, downwards.
     down: Lines,
-    reach: usize,
 }
 
 /// The rows through a cell, or the columns, abreast: what the first pixels of all of them show, then the second ones, and so on. A few that show nothing
@@ -107,7 +106,7 @@ impl Around {
                 }
             }
         }
-        Self { across, down, reach }
+        Self { across, down }
     }
 
     /// Column and row of every pixel of the cell, row by row.
@@ -134,11 +133,11 @@ impl Around {
             [across[0][x][line_x], across[1][x][line_x], down[0][y][line_y], down[1][y][line_y]]
         })
     }
+}
 
-    /// How far an outline is that a pixel beyond it is so many steps from, pixels: it runs between two pixels' centres. `None`: out of reach.
-    pub fn distance(&self, steps: u8) -> Option<f32> {
-        (usize::from(steps) <= self.reach).then(|| f32::from(steps) - 0.5)
-    }
+/// How far an outline is that a pixel beyond it is so many steps from, pixels: it runs between two pixels' centres. `None`: out of reach.
+pub(crate) fn distance(steps: u8, reach: usize) -> Option<f32> {
+    (usize::from(steps) <= reach).then(|| f32::from(steps) - 0.5)
 }
 
 #[cfg(test)]
@@ -190,7 +189,7 @@ mod tests {
                 for sheet in 0..list.len() {
                     let pixels = rows.clone().flat_map(|y| columns.clone().map(move |x| [x, y]));
                     for ((at, steps), shown) in pixels.zip(around.steps(sheet as u8)).zip(around.shown()) {
-                        let within = steps.map(|steps| if around.distance(steps).is_some() { steps } else { NONE });
+                        let within = steps.map(|steps| if distance(steps, reach).is_some() { steps } else { NONE });
                         assert_eq!(within, looked(&gbuffer, &list, reach, sheet, at), "{at:?}, sheet {sheet}");
                         let label = gbuffer.label[at[1] * width as usize + at[0]];
                         assert_eq!(list.iter().position(|&own| u16::from(own) == label), (shown != NONE).then_some(usize::from(shown)));

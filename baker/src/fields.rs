@@ -4,7 +4,7 @@
 //!
 //! Things thinner than a few cells are *strips*: two fields, the distances from two opposite sides, both positive inside.
 
-use crate::around::{Around, NONE};
+use crate::around::{Around, NONE, Steps, distance as away};
 use crate::fit::{self, Problem, Target};
 use crate::gbuffer::GBuffer;
 use crate::sheets::{KeyGrid, Layers, Sheets};
@@ -56,16 +56,16 @@ pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers
 impl Fields {
     /// Fits fields anew, now that tests are chosen: those that tests ask for, and none else.
     #[must_use]
-    pub fn tested(self, gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers) -> Self {
+    pub fn tested(&self, gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers) -> Self {
         let outlines = Outlines { gbuffer, grid, sheets, layers, thin: &self.thin };
-        Self { distance: outlines.fit(true), thin: self.thin }
+        Self { distance: outlines.fit(true), thin: self.thin.clone() }
     }
 
     /// Likewise, on from what they are.
     #[must_use]
     pub fn settled(self, gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers) -> Self {
         let outlines = Outlines { gbuffer, grid, sheets, layers, thin: &self.thin };
-        Self { distance: outlines.refit(self.distance, true), thin: self.thin }
+        Self { distance: outlines.refit(self.distance, &outlines.seen(true)), thin: self.thin }
     }
 
     /// Whether a label is a strip.
@@ -100,57 +100,83 @@ struct Outlines<'a> {
     thin: &'a [Thin],
 }
 
+/// How far a pixel is from where a sheet ends, and whether it shows it; `None`: it does not matter.
+type Seen = Option<(bool, Steps)>;
+
 impl<'a> Outlines<'a> {
-    /// To fit the fields of those sheets that are tested by them, or of all.
+    /// To fit the fields of sheets that `seen` is about.
     fn problem<'s>(
         &'s self,
         known: Option<&'s [[f32; 2]]>,
-        tested: bool,
+        seen: &'s [Vec<Seen>],
     ) -> Problem<'s, impl Fn(usize, u32, &mut Vec<Target>) + Sync + use<'s, 'a>> {
         let &Outlines { grid, sheets, layers, .. } = self;
-        let targets = move |index: usize, frame: u32, targets: &mut Vec<Target>| self.targets(index, frame, tested, targets);
+        let targets = |index: usize, frame: u32, targets: &mut Vec<Target>| self.targets(index, frame, &seen[index], targets);
         Problem { grid, sheets, layers, time: TIME_LINEAR, space: SPACE_LINEAR, prior: None, known, refit: hinge, targets }
     }
 
     /// The fields of those sheets that are tested by them, or of all, from nothing.
     fn fit(&self, tested: bool) -> Vec<[f32; 2]> {
-        self.refit(fit::solve_for(&self.problem(None, tested)).uv, tested)
+        let seen = self.seen(tested);
+        self.refit(fit::solve_for(&self.problem(None, &seen)).uv, &seen)
     }
 
     /// `fields` after a few refits, as the player will have them.
-    fn refit(&self, mut fields: Vec<[f32; 2]>, tested: bool) -> Vec<[f32; 2]> {
+    fn refit(&self, mut fields: Vec<[f32; 2]>, seen: &[Vec<Seen>]) -> Vec<[f32; 2]> {
         for _ in 0..REFITS {
-            let fit = fit::solve_for(&self.problem(Some(&fields), tested));
+            let fit = fit::solve_for(&self.problem(Some(&fields), seen));
             fields = fit.uv;
         }
         fields.iter().map(|pair| pair.map(|field| distance(code(field)))).collect()
     }
 
-    /// What the sheets of a cell and interval ask of its pixels in a frame, given no targets: those that are tested by their fields, or all.
-    fn targets(&self, index: usize, frame: u32, tested: bool, targets: &mut Vec<Target>) {
-        let &Outlines { gbuffer, grid, .. } = self;
-        let list = &self.sheets.lists[index];
-        let asked = || list.iter().enumerate().filter(|&(sheet, _)| !tested || tests_field(self.sheets, index, sheet));
-        if list.len() < 2 || asked().next().is_none() {
-            return;
-        }
-        let reach = REACH * (1u32 << grid.grid.log2) as f32;
-        let around = Around::new(gbuffer, grid, list, reach as usize, frame, index % grid.grid.cells());
-        targets.resize(around.shown().count() * list.len(), None);
-        for (sheet, &label) in asked() {
-            for ((pixel, shown), steps) in around.shown().enumerate().zip(around.steps(sheet as u8)) {
-                // What is hidden by a sheet further in front does not matter, nor what no sheet shows.
-                if shown == NONE || usize::from(shown) < sheet {
-                    continue;
-                }
-                let inside = usize::from(shown) == sheet;
-                let distances = steps.map(|steps| around.distance(steps));
-                targets[pixel * list.len() + sheet] = match self.thin[usize::from(label)] {
-                    Thin::No => Some(signed(distances, inside, reach)),
-                    Thin::Across => strip(distances[0], distances[1], inside, reach),
-                    Thin::Down => strip(distances[2], distances[3], inside, reach),
-                };
+    /// How far pixels are from the outlines of those sheets that are tested by their fields, or of all: for every cell and interval, where some are, frame
+    /// by frame, and pixel by pixel, as [`KeyGrid::each_pixel`] has them, for all sheets of its list.
+    fn seen(&self, tested: bool) -> Vec<Vec<Seen>> {
+        let &Outlines { gbuffer, grid, sheets, .. } = self;
+        let cells = grid.grid.cells();
+        let of = |index: usize| {
+            let list = &sheets.lists[index];
+            let asked: Vec<u8> = (0..).take(list.len()).filter(|&sheet| !tested || tests_field(sheets, index, sheet.into())).collect();
+            let mut seen = Vec::new();
+            if list.len() < 2 || asked.is_empty() {
+                return seen;
             }
+            for frame in grid.frames_of(index / cells) {
+                let (around, first) = (Around::new(gbuffer, grid, list, self.reach(), frame, index % cells), seen.len());
+                seen.resize(first + around.shown().count() * list.len(), None);
+                for &sheet in &asked {
+                    let places = seen[first..].iter_mut().skip(sheet.into()).step_by(list.len());
+                    // What is hidden by a sheet further in front does not matter, nor what no sheet shows.
+                    let pixels =
+                        places.zip(around.shown().zip(around.steps(sheet))).filter(|(_, (shown, _))| *shown != NONE && *shown >= sheet);
+                    pixels.for_each(|(place, (shown, steps))| *place = Some((shown == sheet, steps)));
+                }
+            }
+            seen
+        };
+        (0..sheets.lists.len()).into_par_iter().map(of).collect()
+    }
+
+    /// How far around a pixel is looked, pixels.
+    fn reach(&self) -> usize {
+        (REACH * (1u32 << self.grid.grid.log2) as f32) as usize
+    }
+
+    /// What the sheets of a cell and interval ask of its pixels in a frame, given no targets and what is `seen` there.
+    fn targets(&self, index: usize, frame: u32, seen: &[Seen], targets: &mut Vec<Target>) {
+        let (list, frames) = (&self.sheets.lists[index], self.grid.frames_of(index / self.grid.grid.cells()));
+        let (reach, each) = (self.reach(), seen.len() / frames.len().max(1));
+        let own = (frame - frames.start) as usize * each;
+        for (seen, &label) in seen[own..own + each].iter().zip(list.iter().cycle()) {
+            targets.push(seen.and_then(|(inside, steps)| {
+                let distances = steps.map(|steps| away(steps, reach));
+                match self.thin[usize::from(label)] {
+                    Thin::No => Some(signed(distances, inside, reach as f32)),
+                    Thin::Across => strip(distances[0], distances[1], inside, reach as f32),
+                    Thin::Down => strip(distances[2], distances[3], inside, reach as f32),
+                }
+            }));
         }
     }
 }
@@ -229,7 +255,7 @@ fn thin_labels(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, labels: usize
                 found.dedup();
                 for label in found {
                     let around = Around::new(gbuffer, grid, &[label], THIN * size, frame, cell);
-                    let run = |a: u8, b: u8| around.distance(a).zip(around.distance(b)).map_or(f32::INFINITY, |(a, b)| a + b);
+                    let run = |a: u8, b: u8| away(a, THIN * size).zip(away(b, THIN * size)).map_or(f32::INFINITY, |(a, b)| a + b);
                     let own = around.shown().zip(around.steps(0)).filter(|&(shown, _)| shown == 0);
                     // The longest runs across and down.
                     let runs = own.fold([0.0f32; 2], |most, (_, [left, right, up, down])| {

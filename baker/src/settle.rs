@@ -11,15 +11,21 @@ use crate::sheets::Sheets;
 /// the antialiased truth with softened outlines, for half to two thirds as much time for fitting again; three more made .0 to .3, for as much.
 const TURNS: usize = 2;
 
-/// Sorts `sheets` front to back, and chooses their tests and the fields that these ask for.
+/// Fields of all `sheets`, whether or not tests will ask for them; their charts tell the sheets' order so far.
 #[must_use]
-pub fn settle(evidence: &Evidence<'_>, sheets: &mut Sheets) -> Fields {
+pub fn all(evidence: &Evidence<'_>, sheets: &mut Sheets) -> Fields {
     let &Evidence { gbuffer, grid, image, layers, .. } = evidence;
     order::sort(evidence, None, sheets);
-    let mut fields = fields::solve(gbuffer, grid, sheets, layers, image.labels.len());
-    order::sort(evidence, Some(&fields), sheets);
+    fields::solve(gbuffer, grid, sheets, layers, image.labels.len())
+}
+
+/// Sorts `sheets` front to back, and chooses their tests and the fields that these ask for, given fields of [`all`] of them.
+#[must_use]
+pub fn settle(evidence: &Evidence<'_>, all: &Fields, sheets: &mut Sheets) -> Fields {
+    let &Evidence { gbuffer, grid, layers, .. } = evidence;
+    order::sort(evidence, Some(all), sheets);
     // What no test asks for would hold fields back that some tests do.
-    fields = fields.tested(gbuffer, grid, sheets, layers);
+    let mut fields = all.tested(gbuffer, grid, sheets, layers);
     for _ in 0..TURNS {
         order::sort(evidence, Some(&fields), sheets);
         fields = fields.settled(gbuffer, grid, sheets, layers);

@@ -77,24 +77,30 @@ impl<'a> Footprints<'a> {
 
     /// Adds the texels that pixels see, to the charts' masks of each of some sizes: faces may be too thin for a colour sample.
     pub fn add_seen(&self, levels: &mut [Vec<Mask>]) {
-        let alone =
-            |masks: &Vec<Mask>| -> Vec<Place> { masks.iter().enumerate().map(|(i, m)| self.place(i, [m.width, m.height])).collect() };
-        let places: Vec<Vec<Place>> = levels.iter().map(alone).collect();
-        // Where each chart's bits start, level by level.
+        // The places of each chart alone, where its bits start there, and where they do at every level: many charts are the same size at several.
         let mut bits = 0;
-        let mut start = |m: &Mask| {
-            bits += m.width as usize * m.height as usize;
-            bits - m.width as usize * m.height as usize
+        let mut alone: Vec<Vec<(Place, usize)>> = vec![Vec::new(); self.charting.charts.len()];
+        let mut start = |chart: usize, mask: &Mask| {
+            let size = [mask.width, mask.height];
+            match alone[chart].last() {
+                Some((last, start)) if last.size() == size => *start,
+                _ => {
+                    alone[chart].push((self.place(chart, size), bits));
+                    bits += size[0] as usize * size[1] as usize;
+                    bits - size[0] as usize * size[1] as usize
+                }
+            }
         };
-        let starts: Vec<Vec<usize>> = levels.iter().map(|masks| masks.iter().map(&mut start).collect()).collect();
+        let starts: Vec<Vec<usize>> =
+            levels.iter().map(|masks| masks.iter().enumerate().map(|(chart, mask)| start(chart, mask)).collect()).collect();
         let seen: Vec<AtomicU64> = (0..bits.div_ceil(64)).map(|_| AtomicU64::new(0)).collect();
         self.hits.samples.par_chunks(1 << 16).for_each(|samples| {
             for s in samples.iter().filter(|s| s.surface != BACKGROUND) {
                 let face = self.charting.faces.of[s.surface as usize] as usize;
                 let chart = self.charting.chart_of[face] as usize;
                 let flat = self.charting.flat(face, f64::from(s.b), f64::from(s.c));
-                for (places, starts) in places.iter().zip(&starts) {
-                    mark(&seen, starts[chart], &places[chart], flat);
+                for (place, start) in &alone[chart] {
+                    mark(&seen, *start, place, flat);
                 }
             }
         });

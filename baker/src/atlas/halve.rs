@@ -25,11 +25,17 @@ const WORTH: f64 = 3.0;
 /// Nothing is cut for less than this share of the image: every cut takes memory of the player, too.
 const SOME: f64 = 0.1;
 
-/// Cuts some of the charts in two while that pays in an image of raw texels that take `texel` bytes each; how many. `pack` lays charts out.
-pub(super) fn halve(scene: &Scene, hits: &Hits, charting: &mut Charting, texel: f64, pack: impl Fn(&Charting) -> Option<Layout>) -> usize {
+/// Cuts some of the charts in two while that pays in an image of raw texels that take `texel` bytes each; how many, and how `pack` lays all charts out then.
+pub(super) fn halve(
+    scene: &Scene,
+    hits: &Hits,
+    charting: &mut Charting,
+    texel: f64,
+    pack: impl Fn(&Charting) -> Option<Layout>,
+) -> (usize, Option<Layout>) {
     let (mut packed, mut cuts) = (pack(charting), 0);
     // Where not all the density fits, room is short for another reason.
-    while let Some(layout) = packed.filter(|layout| layout.scale >= 1.0 && cuts < CUTS) {
+    while let Some(layout) = packed.as_ref().filter(|layout| layout.scale >= 1.0 && cuts < CUTS) {
         let whole = layout.worth();
         let sizes: Vec<[u32; 2]> = layout.places.iter().map(Place::size).collect();
         let masks = Footprints::new(scene, hits, charting).drawn(&sizes, layout.scale);
@@ -56,7 +62,7 @@ pub(super) fn halve(scene: &Scene, hits: &Hits, charting: &mut Charting, texel: 
         charting.exchange(cut);
         (packed, cuts) = (Some(layout), cuts + 1);
     }
-    cuts
+    (cuts, packed)
 }
 
 /// A cut that pays.

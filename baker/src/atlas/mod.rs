@@ -252,20 +252,21 @@ pub(crate) fn of_charts(
 ) -> Result<Atlas, AtlasError> {
     let backdrop = backdrop(scene, hits);
     let pack = |charting: &Charting| pack::pack(&footprint::Footprints::new(scene, hits, charting), backdrop, settings.max_side);
-    let halved = match settings.storage {
+    let (halved, mut packed) = match settings.storage {
         Storage::Raw => halve::halve(scene, hits, &mut charting, texel_bytes(settings.texels), pack),
         // Empty texels take next to nothing.
-        Storage::Packed => 0,
+        Storage::Packed => (0, None),
     };
     if settings.charts.rewarped {
         chart::rewarp(hits, &mut charting);
+        packed = None;
     }
     progress(1, 4);
     if charting.charts.len() > MOST_CHARTS {
         return Err(AtlasError::Charts(charting.charts.len()));
     }
     let chart::Labels { of: label_of, count: labels, crowded } = chart::assign(hits, &charting, MOST_LABELS - 1);
-    let layout = pack(&charting).ok_or(AtlasError::Room { charts: charting.charts.len(), side: settings.max_side })?;
+    let layout = packed.or_else(|| pack(&charting)).ok_or(AtlasError::Room { charts: charting.charts.len(), side: settings.max_side })?;
     let layout = match settings.storage {
         Storage::Raw => pack::filled(&footprint::Footprints::new(scene, hits, &charting), backdrop, settings.max_side, layout),
         Storage::Packed => layout,

@@ -229,7 +229,7 @@ fn keys(
             lengths: [grid.length(position as isize - 1), grid.length(position as isize - 2)],
             camera: content.cameras.get(position).copied().unwrap_or_default(),
         };
-        let mut source = Wanted { content, settings, key: position, price: 0.0 };
+        let mut source = Wanted { content, settings, key: position, price: 0.0, enough: f64::INFINITY };
         let mut encoder = Encoder::default();
         stream.code(&mut encoder, shape, place, &mut source);
         if let Some(key) = stream.key(0) {
@@ -299,6 +299,8 @@ struct Wanted<'a> {
     key: usize,
     /// What residuals cost so far: bits, and what they are off in as many.
     price: f64,
+    /// From how much on that does not matter any more.
+    enough: f64,
 }
 
 /// What it costs to tell a chain that its base is another than expected, bits.
@@ -322,11 +324,13 @@ impl Source for Wanted<'_> {
         let mut best = (f64::INFINITY, expected);
         for base in Base::ALL {
             self.price = if base == expected { 0.0 } else { OTHER_BASE };
+            self.enough = best.0;
             trial(self, base);
             if self.price < best.0 {
                 best = (self.price, base);
             }
         }
+        self.enough = f64::INFINITY;
         best.1
     }
 
@@ -335,6 +339,10 @@ impl Source for Wanted<'_> {
         let unit = (1u32 << key_bits(self.content.image)) as f32;
         let step = (1u32 << self.settings.step_log2) as f32 / unit;
         let mut residual = [0, 0];
+        // A trial that is lost may as well go on from anywhere.
+        if self.price >= self.enough {
+            return residual;
+        }
         for axis in 0..2 {
             let wanted = self.content.fit.uv[layer][axis].clamp(KEY_MIN as f32 / unit, KEY_MAX as f32 / unit);
             let exact = (wanted - predicted[axis] as f32 / unit) / step;
