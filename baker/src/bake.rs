@@ -6,7 +6,6 @@ use crate::cast::Cast;
 use crate::causes::{self, Causes};
 use crate::chart;
 use crate::encode::{self, CodingSettings, Content};
-use crate::fields::Fields;
 use crate::fit::{self, Fit};
 use crate::folds::{self, Folded};
 use crate::gbuffer::Lens;
@@ -17,7 +16,6 @@ use crate::verify::VerifyError;
 use crate::walls;
 use crate::{cuts, order, prune, settle, spare, tears, timing};
 use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC};
-use std::sync::Arc;
 use std::time::Instant;
 use thiserror::Error;
 
@@ -191,8 +189,6 @@ pub struct Encoded {
     pub dropped_pixels: u64,
     /// Why cells are torn.
     pub torn_by_cause: Causes,
-    /// Fields of all its sheets, as nothing but their outlines in the pictures asks for them.
-    pub(crate) all: Arc<Fields>,
     /// Seconds for sheets, fit and coding.
     pub seconds: f64,
 }
@@ -283,19 +279,11 @@ pub fn fitted(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     Ok(Fitted { grid, folded, sheets, layers, fit, charts, lenses, torn_by_cause, seconds: start.elapsed().as_secs_f64() })
 }
 
-/// Settles which of the `fitted` sheets shows where, codes the keys, and puts the bundle together; `settings` are those of the fit. `all`: fields of the same
-/// sheets, in other charts or another space, where they are known.
+/// Settles which of the `fitted` sheets shows where, codes the keys, and puts the bundle together; `settings` are those of the fit.
 ///
 /// # Errors
 /// [`BakeError`] where the scene exceeds what a bundle holds.
-pub fn settled(
-    scene: &Scene,
-    flat: &Flat,
-    fitted: &Fitted,
-    settings: &Settings,
-    all: Option<&Arc<Fields>>,
-    progress: Progress<'_>,
-) -> Result<Encoded, BakeError> {
+pub fn settled(scene: &Scene, flat: &Flat, fitted: &Fitted, settings: &Settings, progress: Progress<'_>) -> Result<Encoded, BakeError> {
     let start = Instant::now();
     let Fitted { grid, folded: Folded { gbuffer, labels, .. }, layers, fit, charts, lenses, torn_by_cause, .. } = fitted;
     let image = &SourceImage { labels: labels.clone(), ..flat.atlas.image.clone() };
@@ -303,8 +291,7 @@ pub fn settled(
     progress("fitting outlines", 0.5);
     let &Settings { field_price, coverage, .. } = settings;
     let evidence = order::Evidence { gbuffer, grid, image, layers, fit, field_price, coverage };
-    let all = all.map_or_else(|| Arc::new(settle::all(&evidence, &mut sheets)), Arc::clone);
-    let fields = settle::settle(&evidence, &all, &mut sheets);
+    let fields = settle::settle(&evidence, &mut sheets);
     progress("coding keys", 0.8);
     let choice = settings.atlas.charts;
     let reason = || chart::reason(choice.family, choice.rewarped, choice.tried());
@@ -321,7 +308,7 @@ pub fn settled(
     };
     progress("coding keys", 1.0);
     let seconds = fitted.seconds + start.elapsed().as_secs_f64();
-    Ok(Encoded { bundle, grid: grid.clone(), dropped_pixels: sheets.dropped, torn_by_cause: *torn_by_cause, all, seconds })
+    Ok(Encoded { bundle, grid: grid.clone(), dropped_pixels: sheets.dropped, torn_by_cause: *torn_by_cause, seconds })
 }
 
 /// Fits and codes the keys, and puts the bundle together.
@@ -329,5 +316,5 @@ pub fn settled(
 /// # Errors
 /// Those of [`fitted`] and [`settled`].
 pub fn encode(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progress<'_>) -> Result<Encoded, BakeError> {
-    settled(scene, flat, &fitted(scene, flat, settings, progress)?, settings, None, progress)
+    settled(scene, flat, &fitted(scene, flat, settings, progress)?, settings, progress)
 }

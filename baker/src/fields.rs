@@ -56,9 +56,9 @@ pub fn solve(gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers
 impl Fields {
     /// Fits fields anew, now that tests are chosen: those that tests ask for, and none else.
     #[must_use]
-    pub fn tested(&self, gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers) -> Self {
+    pub fn tested(self, gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers) -> Self {
         let outlines = Outlines { gbuffer, grid, sheets, layers, thin: &self.thin };
-        Self { distance: outlines.fit(true), thin: self.thin.clone() }
+        Self { distance: outlines.fit(true), thin: self.thin }
     }
 
     /// Likewise, on from what they are.

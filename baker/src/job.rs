@@ -237,7 +237,7 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
             let flat = bake::flatten_cast(&cast, &settings.atlas, progress)?;
             something_seen(&flat)?;
             let fitted = bake::fitted(scene, &flat, &settings, progress)?;
-            let encoded = bake::settled(scene, &flat, &fitted, &settings, None, progress)?;
+            let encoded = bake::settled(scene, &flat, &fitted, &settings, progress)?;
             (Chosen { flat, encoded, settings, search_seconds: 0.0, warnings: Vec::new() }, Some(fitted))
         }
         goal => (tune::search((&cast, painter.as_ref()), options, goal, whole, progress)?, None),

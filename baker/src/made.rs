@@ -2,13 +2,11 @@
 
 use crate::bake::{self, BakeError, Encoded, Fitted, Flat, Settings};
 use crate::encode::image_bytes;
-use crate::fields::Fields;
 use crate::metrics;
 use crate::report::grouped;
 use crate::scene::Scene;
 use crate::spare::DOUBLE;
 use crate::verify::{self, Brief};
-use std::sync::Arc;
 
 /// A bundle, what made it, and how good it is.
 pub(crate) struct Made {
@@ -23,15 +21,15 @@ impl Made {
     /// # Errors
     /// Those of encoding, and of the player.
     pub fn new(scene: &Scene, flat: &Flat, settings: Settings) -> Result<Self, BakeError> {
-        Self::of(scene, flat, &bake::fitted(scene, flat, &settings, &|_, _| {})?, settings, None)
+        Self::of(scene, flat, &bake::fitted(scene, flat, &settings, &|_, _| {})?, settings)
     }
 
-    /// What the same make of sheets that are `fitted` already; `all`: fields of the same sheets, where they are known.
+    /// What the same make of sheets that are `fitted` already.
     ///
     /// # Errors
     /// The same.
-    pub fn of(scene: &Scene, flat: &Flat, fitted: &Fitted, settings: Settings, all: Option<&Arc<Fields>>) -> Result<Self, BakeError> {
-        let encoded = bake::settled(scene, flat, fitted, &settings, all, &|_, _| {})?;
+    pub fn of(scene: &Scene, flat: &Flat, fitted: &Fitted, settings: Settings) -> Result<Self, BakeError> {
+        let encoded = bake::settled(scene, flat, fitted, &settings, &|_, _| {})?;
         let quality = verify::briefly(&encoded.bundle, &flat.atlas.image, &flat.atlas.gbuffer)?;
         Ok(Self { settings, encoded, quality })
     }

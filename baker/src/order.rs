@@ -93,12 +93,43 @@ struct Choice {
     cost: Cost,
 }
 
+/// What the pixels of a torn cell and interval see of its sheets where these are fitted to, whatever fields say.
+#[derive(Default)]
+struct Look {
+    /// The sheets in the order that they had then.
+    list: Vec<u8>,
+    /// Every pixel, as [`KeyGrid::each_pixel`] has them, frame by frame.
+    pixels: Vec<Pixel>,
+    /// What it costs every pixel to show each sheet.
+    costs: Vec<u16>,
+}
+
+/// One pixel of it.
+struct Pixel {
+    /// The sheet that should show; [`NO_SHEET`] where it was left out.
+    sheet: u8,
+    /// The sheets whose chart covers the pixel, one bit each.
+    covering: u16,
+}
+
+/// The same for all cells and intervals: looked up once for all sorts.
+pub struct Looks(Vec<Look>);
+
+impl Looks {
+    /// What is seen of `sheets`.
+    #[must_use]
+    pub fn new(evidence: &Evidence<'_>, sheets: &Sheets) -> Self {
+        let of = |(index, list): (usize, &Vec<u8>)| if list.len() > 1 { look(evidence, index, list) } else { Look::default() };
+        Self(sheets.lists.par_iter().enumerate().map(of).collect())
+    }
+}
+
 /// Sorts the sheets of every cell front to back and chooses their tests, given their `fields` once these are known.
-pub fn sort(evidence: &Evidence<'_>, fields: Option<&Fields>, sheets: &mut Sheets) {
+pub fn sort(evidence: &Evidence<'_>, looks: &Looks, fields: Option<&Fields>, sheets: &mut Sheets) {
     let candidates = &evidence.candidates(fields);
-    let torn = sheets.lists.par_iter_mut().zip(&mut sheets.tests).enumerate().filter(|(_, (list, _))| list.len() > 1);
-    torn.for_each(|(index, (list, tests))| {
-        let groups = observe(evidence, fields, index, list);
+    let cells = sheets.lists.par_iter_mut().zip(&mut sheets.tests).zip(&looks.0).enumerate();
+    cells.filter(|(_, ((list, _), _))| list.len() > 1).for_each(|(index, ((list, tests), look))| {
+        let groups = observe(evidence, look, fields, index, list);
         let choose = if list.len() <= EXHAUSTIVE { best } else { greedy };
         let choice = choose(&groups, list.len(), candidates);
         *list = choice.order.iter().map(|&sheet| list[sheet]).collect();
@@ -106,43 +137,63 @@ pub fn sort(evidence: &Evidence<'_>, fields: Option<&Fields>, sheets: &mut Sheet
     });
 }
 
-/// Sums up the pixels of a cell and interval by what they see and what would cover them.
-fn observe(evidence: &Evidence<'_>, fields: Option<&Fields>, index: usize, list: &[u8]) -> Vec<Group> {
-    let &Evidence { gbuffer, grid, image, layers, fit, .. } = evidence;
-    let cells = grid.grid.cells();
-    let (interval, cell) = (index / cells, index % cells);
-    let patches = |ways| -> Vec<Patch> { list.iter().map(|&label| Patch::new(grid, layers, [interval, cell], label, ways)).collect() };
-    let (position_patches, field_patches) = (patches([grid.time, grid.space]), patches([TIME_LINEAR, SPACE_LINEAR]));
+/// The patches of the sheets of a cell and interval, interpolated in some ways.
+fn patches(evidence: &Evidence<'_>, index: usize, list: &[u8], ways: [u8; 2]) -> Vec<Patch> {
+    let &Evidence { grid, layers, .. } = evidence;
+    let place = [index / grid.grid.cells(), index % grid.grid.cells()];
+    list.iter().map(|&label| Patch::new(grid, layers, place, label, ways)).collect()
+}
+
+/// Looks at the pixels of a cell and interval.
+fn look(evidence: &Evidence<'_>, index: usize, list: &[u8]) -> Look {
+    let &Evidence { gbuffer, grid, image, fit, .. } = evidence;
+    let (interval, cell) = (index / grid.grid.cells(), index % grid.grid.cells());
+    let patches = patches(evidence, index, list, [grid.time, grid.space]);
     let charts: Vec<Chart> = list.iter().map(|&label| Chart::new(image, label)).collect();
-    let strips: Vec<bool> = list.iter().map(|&label| fields.is_some_and(|fields| fields.strip(label))).collect();
-    let mut seen = Seen::default();
+    let mut look = Look { list: list.to_vec(), ..Look::default() };
     for frame in grid.frames_of(interval) {
         let weights = grid.weights(interval, frame, grid.time);
-        let linear = grid.weights(interval, frame, TIME_LINEAR);
-        let positions: Vec<Values> = position_patches.iter().map(|patch| patch.values(&fit.uv, &weights)).collect();
-        // Fields do not bend.
-        let of = |fields: &Fields| field_patches.iter().map(|patch| patch::first(&patch.values(&fields.distance, &linear))).collect();
-        let distances: Vec<[[f32; 2]; CORNERS.len()]> = fields.map(of).unwrap_or_default();
+        let positions: Vec<Values> = patches.iter().map(|patch| patch.values(&fit.uv, &weights)).collect();
         grid.each_pixel(frame, cell, |pixel, at| {
             let sheet = list.iter().position(|&label| u16::from(label) == gbuffer.label[pixel]).unwrap_or(NO_SHEET);
-            let right = image.colour_at(gbuffer.uv[pixel]);
-            let mut costs = [0; MAX_SHEETS];
-            let shares = patch::shares(at);
-            let mut covering = 0u32;
+            let (right, shares) = (image.colour_at(gbuffer.uv[pixel]), patch::shares(at));
+            let mut covering = 0;
             for (place, (values, chart)) in positions.iter().zip(&charts).enumerate() {
                 let uv = patch::value(values, &shares);
-                covering |= u32::from(chart.covers(image, uv)) << place;
-                if place != sheet {
-                    costs[place] = cost(right, image.colour_at(uv));
-                }
+                covering |= u16::from(chart.covers(image, uv)) << place;
+                look.costs.push(if place == sheet { 0 } else { cost(right, image.colour_at(uv)) });
             }
+            look.pixels.push(Pixel { sheet: sheet as u8, covering });
+        });
+    }
+    look
+}
+
+/// Sums up the pixels of a cell and interval by what they see and what would cover them.
+fn observe(evidence: &Evidence<'_>, look: &Look, fields: Option<&Fields>, index: usize, list: &[u8]) -> Vec<Group> {
+    let grid = evidence.grid;
+    let (interval, cell) = (index / grid.grid.cells(), index % grid.grid.cells());
+    let patches = patches(evidence, index, list, [TIME_LINEAR, SPACE_LINEAR]);
+    let strips: Vec<bool> = list.iter().map(|&label| fields.is_some_and(|fields| fields.strip(label))).collect();
+    // Which sheet of the look each one of the list is, and the other way round.
+    let then: Vec<usize> = list.iter().filter_map(|label| look.list.iter().position(|then| then == label)).collect();
+    let now: Vec<usize> = look.list.iter().filter_map(|then| list.iter().position(|label| label == then)).collect();
+    let (mut seen, mut pixels) = (Seen::default(), look.pixels.iter().zip(look.costs.chunks_exact(list.len())));
+    for frame in grid.frames_of(interval) {
+        let linear = grid.weights(interval, frame, TIME_LINEAR);
+        // Fields do not bend.
+        let of = |fields: &Fields| patches.iter().map(|patch| patch::first(&patch.values(&fields.distance, &linear))).collect();
+        let distances: Vec<[[f32; 2]; CORNERS.len()]> = fields.map(of).unwrap_or_default();
+        grid.each_pixel(frame, cell, |_, at| {
+            let Some((pixel, costs)) = pixels.next() else { return };
+            let mut covering = then.iter().enumerate().fold(0, |all, (place, then)| all | u32::from(pixel.covering >> then & 1) << place);
             let shares = bilinear(at);
             for (place, (values, &strip)) in distances.iter().zip(&strips).enumerate() {
                 let [a, b] = patch::value(values, &shares);
                 covering |= u32::from(a > 0.0 && (!strip || b > 0.0)) << (16 + place);
             }
-            let sums = seen.group(sheet, covering);
-            sums.iter_mut().zip(costs).for_each(|(sum, cost)| *sum += Cost::from(cost));
+            let sums = seen.group(now.get(usize::from(pixel.sheet)).copied().unwrap_or(NO_SHEET), covering);
+            sums.iter_mut().zip(&then).for_each(|(sum, &then)| *sum += Cost::from(costs[then]));
         });
     }
     seen.groups
@@ -171,10 +222,10 @@ impl Seen {
 }
 
 /// What it costs to show a colour of a wrong sheet.
-fn cost(right: [u8; 3], shown: [u8; 3]) -> u32 {
+fn cost(right: [u8; 3], shown: [u8; 3]) -> u16 {
     let square = |k: usize| u32::from(right[k].abs_diff(shown[k])).pow(2);
     let off = square(0) + square(1) + square(2);
-    (HIDDEN + (PIXEL - HIDDEN) * off / PLAIN).min(MOST * PIXEL)
+    (HIDDEN + (PIXEL - HIDDEN) * off / PLAIN).min(MOST * PIXEL) as u16
 }
 
 /// The rectangle of a chart, texels, and whether its outline tells more.
@@ -324,6 +375,7 @@ mod tests {
         let mut most = group(0, 0b11, 30);
         most.cost[1] /= 2;
         assert_eq!(best(&[most, group(1, 0b11, 20)], 2, &[(CHART, 0)]).order[0], 1);
+        let cost = |right, shown| u32::from(cost(right, shown));
         assert!(cost([10, 20, 30], [11, 20, 30]) < PIXEL / 2 && cost([0; 3], [255; 3]) == MOST * PIXEL);
     }
 }

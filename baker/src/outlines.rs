@@ -55,7 +55,7 @@ pub(crate) fn choose(
         let mut settings = best.2.settings;
         settings.atlas.outline = Some(outline.finer);
         flat.atlas.image.outline = outline.clone();
-        let made = Made::of(scene, flat, fitted, settings, Some(&best.2.encoded.all))?;
+        let made = Made::of(scene, flat, fitted, settings)?;
         let trial = Trial::new(&outline, &made);
         let worth = trial.worth();
         trials.push(trial);
@@ -92,7 +92,7 @@ mod tests {
         (scene.playback.width, scene.playback.height, scene.playback.frames) = (64, 48, 17);
         let mut flat = bake::flatten(&scene, &settings.atlas, &|_, _| {}).unwrap();
         let fitted = bake::fitted(&scene, &flat, &settings, &|_, _| {}).unwrap();
-        let usual = Made::of(&scene, &flat, &fitted, settings, None).unwrap();
+        let usual = Made::of(&scene, &flat, &fitted, settings).unwrap();
         let (made, trials) = choose(&scene, &mut flat, &fitted, usual, &|_, _| {}).unwrap();
         (flat.atlas.image.outline.finer, flat, made, trials)
     }

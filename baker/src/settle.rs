@@ -3,7 +3,7 @@
 //! Sheets come from `sheets`, positions from `fit`; order, tests and fields go to `encode`.
 
 use crate::fields::{self, Fields};
-use crate::order::{self, Evidence};
+use crate::order::{self, Evidence, Looks};
 use crate::polish;
 use crate::sheets::Sheets;
 
@@ -11,26 +11,21 @@ use crate::sheets::Sheets;
 /// the antialiased truth with softened outlines, for half to two thirds as much time for fitting again; three more made .0 to .3, for as much.
 const TURNS: usize = 2;
 
-/// Fields of all `sheets`, whether or not tests will ask for them; their charts tell the sheets' order so far.
+/// Sorts `sheets` front to back, and chooses their tests and the fields that these ask for.
 #[must_use]
-pub fn all(evidence: &Evidence<'_>, sheets: &mut Sheets) -> Fields {
+pub fn settle(evidence: &Evidence<'_>, sheets: &mut Sheets) -> Fields {
     let &Evidence { gbuffer, grid, image, layers, .. } = evidence;
-    order::sort(evidence, None, sheets);
-    fields::solve(gbuffer, grid, sheets, layers, image.labels.len())
-}
-
-/// Sorts `sheets` front to back, and chooses their tests and the fields that these ask for, given fields of [`all`] of them.
-#[must_use]
-pub fn settle(evidence: &Evidence<'_>, all: &Fields, sheets: &mut Sheets) -> Fields {
-    let &Evidence { gbuffer, grid, layers, .. } = evidence;
-    order::sort(evidence, Some(all), sheets);
+    let looks = Looks::new(evidence, sheets);
+    order::sort(evidence, &looks, None, sheets);
+    let mut fields = fields::solve(gbuffer, grid, sheets, layers, image.labels.len());
+    order::sort(evidence, &looks, Some(&fields), sheets);
     // What no test asks for would hold fields back that some tests do.
-    let mut fields = all.tested(gbuffer, grid, sheets, layers);
+    fields = fields.tested(gbuffer, grid, sheets, layers);
     for _ in 0..TURNS {
-        order::sort(evidence, Some(&fields), sheets);
+        order::sort(evidence, &looks, Some(&fields), sheets);
         fields = fields.settled(gbuffer, grid, sheets, layers);
     }
     let fields = polish::polish(fields, gbuffer, grid, sheets, layers);
-    order::sort(evidence, Some(&fields), sheets);
+    order::sort(evidence, &looks, Some(&fields), sheets);
     fields
 }

@@ -2,7 +2,7 @@
 //! worth as much. It plays in a twentieth to a sixth fewer instructions and a tenth to a fifth less memory. Large flat surfaces seen at a slant
 //! want the curve, most meshes show no difference.
 
-use crate::bake::{self, BakeError, Flat, Progress, Settings};
+use crate::bake::{BakeError, Flat, Progress, Settings};
 use crate::inspect::{Inspection, space_name};
 use crate::made::Made;
 use crate::report::grouped;
@@ -47,10 +47,7 @@ pub(crate) fn choose(scene: &Scene, flat: &Flat, curved: Made, progress: Progres
         return Ok((curved, Vec::new()));
     }
     progress("trying straight space", 0.0);
-    let settings = Settings { space: SPACE_LINEAR, ..curved.settings };
-    // Where outlines run does not depend on what bends in between.
-    let fitted = bake::fitted(scene, flat, &settings, &|_, _| {})?;
-    let straight = Made::of(scene, flat, &fitted, settings, Some(&curved.encoded.all))?;
+    let straight = Made::new(scene, flat, Settings { space: SPACE_LINEAR, ..curved.settings })?;
     progress("trying straight space", 1.0);
     let trials = vec![Trial::new(&curved)?, Trial::new(&straight)?];
     let picture = curved.picture(flat);
@@ -69,6 +66,7 @@ pub fn reason(trials: &[Trial]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bake;
     use crate::scene::builtin;
     use cubist_core::format::SPACE_CUBIC;
 

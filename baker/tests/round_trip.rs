@@ -55,8 +55,7 @@ fn bake_every(interval: u32, gbuffer: &GBuffer, image: &SourceImage, looping: bo
     let fit = fit::solve(gbuffer, &grid, &sheets, &layers, &vec![None; layers.label.len()]);
     let (field_price, coverage) = (4, Coverage::All);
     let evidence = order::Evidence { gbuffer, grid: &grid, image, layers: &layers, fit: &fit, field_price, coverage };
-    let all = settle::all(&evidence, &mut sheets);
-    let fields = settle::settle(&evidence, &all, &mut sheets);
+    let fields = settle::settle(&evidence, &mut sheets);
     let settings = CodingSettings { step_log2: 0, lambda: 0.0, independent_every };
     let content = Content { grid: &grid, image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields, planes: &[], cameras: &[] };
     encode::bundle(&content, settings, Header { storage: Storage::Raw, fps: 30, info: "two sheets" }).expect("it fits")

@@ -76,8 +76,7 @@ impl Synthetic {
             field_price: 4,
             coverage: Coverage::All,
         };
-        let all = settle::all(&evidence, &mut sheets);
-        let fields = settle::settle(&evidence, &all, &mut sheets);
+        let fields = settle::settle(&evidence, &mut sheets);
         let settings = CodingSettings { step_log2: 0, lambda: 0.0, independent_every: self.independent_every };
         let content =
             Content { grid: &grid, image: &image, sheets: &sheets, layers: &layers, fit: &fit, fields: &fields, planes: &[], cameras: &[] };
