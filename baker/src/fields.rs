@@ -65,7 +65,7 @@ impl Fields {
     #[must_use]
     pub fn settled(self, gbuffer: &GBuffer, grid: &KeyGrid, sheets: &Sheets, layers: &Layers) -> Self {
         let outlines = Outlines { gbuffer, grid, sheets, layers, thin: &self.thin };
-        Self { distance: outlines.refit(self.distance, &outlines.seen(true)), thin: self.thin }
+        Self { distance: outlines.refit(self.distance, &outlines.sides(true)), thin: self.thin }
     }
 
     /// Whether a label is a strip.
@@ -100,60 +100,60 @@ struct Outlines<'a> {
     thin: &'a [Thin],
 }
 
-/// How far a pixel is from where a sheet ends, and whether it shows it; `None`: it does not matter.
-type Seen = Option<(bool, Steps)>;
+/// On which side of a sheet's outline a pixel is, whether it shows the sheet, and how far away; `None`: it does not matter.
+type Side = Option<(bool, Steps)>;
 
 impl<'a> Outlines<'a> {
-    /// To fit the fields of sheets that `seen` is about.
+    /// To fit fields that put pixels on these `sides`.
     fn problem<'s>(
         &'s self,
         known: Option<&'s [[f32; 2]]>,
-        seen: &'s [Vec<Seen>],
+        sides: &'s [Vec<Side>],
     ) -> Problem<'s, impl Fn(usize, u32, &mut Vec<Target>) + Sync + use<'s, 'a>> {
         let &Outlines { grid, sheets, layers, .. } = self;
-        let targets = |index: usize, frame: u32, targets: &mut Vec<Target>| self.targets(index, frame, &seen[index], targets);
+        let targets = |index: usize, frame: u32, targets: &mut Vec<Target>| self.targets(index, frame, &sides[index], targets);
         Problem { grid, sheets, layers, time: TIME_LINEAR, space: SPACE_LINEAR, prior: None, known, refit: hinge, targets }
     }
 
     /// The fields of those sheets that are tested by them, or of all, from nothing.
     fn fit(&self, tested: bool) -> Vec<[f32; 2]> {
-        let seen = self.seen(tested);
-        self.refit(fit::solve_for(&self.problem(None, &seen)).uv, &seen)
+        let sides = self.sides(tested);
+        self.refit(fit::solve_for(&self.problem(None, &sides)).uv, &sides)
     }
 
     /// `fields` after a few refits, as the player will have them.
-    fn refit(&self, mut fields: Vec<[f32; 2]>, seen: &[Vec<Seen>]) -> Vec<[f32; 2]> {
+    fn refit(&self, mut fields: Vec<[f32; 2]>, sides: &[Vec<Side>]) -> Vec<[f32; 2]> {
         for _ in 0..REFITS {
-            let fit = fit::solve_for(&self.problem(Some(&fields), seen));
+            let fit = fit::solve_for(&self.problem(Some(&fields), sides));
             fields = fit.uv;
         }
         fields.iter().map(|pair| pair.map(|field| distance(code(field)))).collect()
     }
 
-    /// How far pixels are from the outlines of those sheets that are tested by their fields, or of all: for every cell and interval, where some are, frame
-    /// by frame, and pixel by pixel, as [`KeyGrid::each_pixel`] has them, for all sheets of its list.
-    fn seen(&self, tested: bool) -> Vec<Vec<Seen>> {
+    /// On which sides pixels are of the outlines of those sheets that are tested by their fields, or of all: for every cell and interval, where some are,
+    /// frame by frame and pixel by pixel, as [`KeyGrid::each_pixel`] has them, of all sheets of its list.
+    fn sides(&self, tested: bool) -> Vec<Vec<Side>> {
         let &Outlines { gbuffer, grid, sheets, .. } = self;
         let cells = grid.grid.cells();
         let of = |index: usize| {
             let list = &sheets.lists[index];
             let asked: Vec<u8> = (0..).take(list.len()).filter(|&sheet| !tested || tests_field(sheets, index, sheet.into())).collect();
-            let mut seen = Vec::new();
+            let mut sides = Vec::new();
             if list.len() < 2 || asked.is_empty() {
-                return seen;
+                return sides;
             }
             for frame in grid.frames_of(index / cells) {
-                let (around, first) = (Around::new(gbuffer, grid, list, self.reach(), frame, index % cells), seen.len());
-                seen.resize(first + around.shown().count() * list.len(), None);
+                let (around, first) = (Around::new(gbuffer, grid, list, self.reach(), frame, index % cells), sides.len());
+                sides.resize(first + around.shown().count() * list.len(), None);
                 for &sheet in &asked {
-                    let places = seen[first..].iter_mut().skip(sheet.into()).step_by(list.len());
+                    let places = sides[first..].iter_mut().skip(sheet.into()).step_by(list.len());
                     // What is hidden by a sheet further in front does not matter, nor what no sheet shows.
                     let pixels =
                         places.zip(around.shown().zip(around.steps(sheet))).filter(|(_, (shown, _))| *shown != NONE && *shown >= sheet);
                     pixels.for_each(|(place, (shown, steps))| *place = Some((shown == sheet, steps)));
                 }
             }
-            seen
+            sides
         };
         (0..sheets.lists.len()).into_par_iter().map(of).collect()
     }
@@ -163,13 +163,13 @@ impl<'a> Outlines<'a> {
         (REACH * (1u32 << self.grid.grid.log2) as f32) as usize
     }
 
-    /// What the sheets of a cell and interval ask of its pixels in a frame, given no targets and what is `seen` there.
-    fn targets(&self, index: usize, frame: u32, seen: &[Seen], targets: &mut Vec<Target>) {
+    /// What the sheets of a cell and interval ask of its pixels in a frame, given no targets and the `sides` that they are on.
+    fn targets(&self, index: usize, frame: u32, sides: &[Side], targets: &mut Vec<Target>) {
         let (list, frames) = (&self.sheets.lists[index], self.grid.frames_of(index / self.grid.grid.cells()));
-        let (reach, each) = (self.reach(), seen.len() / frames.len().max(1));
+        let (reach, each) = (self.reach(), sides.len() / frames.len().max(1));
         let own = (frame - frames.start) as usize * each;
-        for (seen, &label) in seen[own..own + each].iter().zip(list.iter().cycle()) {
-            targets.push(seen.and_then(|(inside, steps)| {
+        for (side, &label) in sides[own..own + each].iter().zip(list.iter().cycle()) {
+            targets.push(side.and_then(|(inside, steps)| {
                 let distances = steps.map(|steps| away(steps, reach));
                 match self.thin[usize::from(label)] {
                     Thin::No => Some(signed(distances, inside, reach as f32)),
