@@ -138,17 +138,15 @@ pub fn sort(evidence: &Evidence<'_>, looks: &Looks, fields: Option<&Fields>, she
 }
 
 /// The patches of the sheets of a cell and interval, interpolated in some ways.
-fn patches(evidence: &Evidence<'_>, index: usize, list: &[u8], ways: [u8; 2]) -> Vec<Patch> {
-    let &Evidence { grid, layers, .. } = evidence;
-    let place = [index / grid.grid.cells(), index % grid.grid.cells()];
-    list.iter().map(|&label| Patch::new(grid, layers, place, label, ways)).collect()
+fn patches(evidence: &Evidence<'_>, place: [usize; 2], list: &[u8], ways: [u8; 2]) -> Vec<Patch> {
+    list.iter().map(|&label| Patch::new(evidence.grid, evidence.layers, place, label, ways)).collect()
 }
 
 /// Looks at the pixels of a cell and interval.
 fn look(evidence: &Evidence<'_>, index: usize, list: &[u8]) -> Look {
     let &Evidence { gbuffer, grid, image, fit, .. } = evidence;
     let (interval, cell) = (index / grid.grid.cells(), index % grid.grid.cells());
-    let patches = patches(evidence, index, list, [grid.time, grid.space]);
+    let patches = patches(evidence, [interval, cell], list, [grid.time, grid.space]);
     let charts: Vec<Chart> = list.iter().map(|&label| Chart::new(image, label)).collect();
     let mut look = Look { list: list.to_vec(), ..Look::default() };
     for frame in grid.frames_of(interval) {
@@ -173,11 +171,10 @@ fn look(evidence: &Evidence<'_>, index: usize, list: &[u8]) -> Look {
 fn observe(evidence: &Evidence<'_>, look: &Look, fields: Option<&Fields>, index: usize, list: &[u8]) -> Vec<Group> {
     let grid = evidence.grid;
     let (interval, cell) = (index / grid.grid.cells(), index % grid.grid.cells());
-    let patches = patches(evidence, index, list, [TIME_LINEAR, SPACE_LINEAR]);
+    let patches = patches(evidence, [interval, cell], list, [TIME_LINEAR, SPACE_LINEAR]);
     let strips: Vec<bool> = list.iter().map(|&label| fields.is_some_and(|fields| fields.strip(label))).collect();
-    // Which sheet of the look each one of the list is, and the other way round.
+    // Which sheet of the look each one of the list is.
     let then: Vec<usize> = list.iter().filter_map(|label| look.list.iter().position(|then| then == label)).collect();
-    let now: Vec<usize> = look.list.iter().filter_map(|then| list.iter().position(|label| label == then)).collect();
     let (mut seen, mut pixels) = (Seen::default(), look.pixels.iter().zip(look.costs.chunks_exact(list.len())));
     for frame in grid.frames_of(interval) {
         let linear = grid.weights(interval, frame, TIME_LINEAR);
@@ -192,7 +189,8 @@ fn observe(evidence: &Evidence<'_>, look: &Look, fields: Option<&Fields>, index:
                 let [a, b] = patch::value(values, &shares);
                 covering |= u32::from(a > 0.0 && (!strip || b > 0.0)) << (16 + place);
             }
-            let sums = seen.group(now.get(usize::from(pixel.sheet)).copied().unwrap_or(NO_SHEET), covering);
+            let sheet = then.iter().position(|&then| then == usize::from(pixel.sheet)).unwrap_or(NO_SHEET);
+            let sums = seen.group(sheet, covering);
             sums.iter_mut().zip(&then).for_each(|(sum, &then)| *sum += Cost::from(costs[then]));
         });
     }

@@ -85,9 +85,10 @@ impl<'a> Footprints<'a> {
             match alone[chart].last() {
                 Some((last, start)) if last.size() == size => *start,
                 _ => {
-                    alone[chart].push((self.place(chart, size), bits));
+                    let start = bits;
+                    alone[chart].push((self.place(chart, size), start));
                     bits += size[0] as usize * size[1] as usize;
-                    bits - size[0] as usize * size[1] as usize
+                    start
                 }
             }
         };
