@@ -3,7 +3,7 @@
 //! source-image coordinates for the sheets and the fit.
 
 use crate::scene::Scene;
-use crate::trace::Tracer;
+use crate::trace::{PACKET, Tracer};
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -124,8 +124,12 @@ impl Hits {
             let y = (line % height as usize) as f64 + 0.5;
             let columns =
                 if y < *y0 || y > *y1 { 0..0 } else { (x0.clamp(0.0, row as f64) as usize)..(x1.clamp(0.0, row as f64).ceil() as usize) };
-            for (x, sample) in out.iter_mut().enumerate().take(columns.end).skip(columns.start) {
-                if let Some(hit) = tracer.hit(lens.eye, lens.ray(x as f64 + 0.5, y)) {
+            for first in columns.clone().step_by(PACKET) {
+                // Past the end of the row the last ray is cast again.
+                let column = |at: usize| (first + at).min(columns.end - 1);
+                let hits = tracer.hits(lens.eye, &std::array::from_fn(|at| lens.ray(column(at) as f64 + 0.5, y)));
+                for (sample, hit) in out[first..columns.end].iter_mut().zip(hits) {
+                    let Some(hit) = hit else { continue };
                     let material = scene.triangles[hit.triangle as usize].material as usize;
                     let side = u32::from(hit.back && sided.get(material).copied().unwrap_or(false));
                     *sample = Sample { surface: hit.triangle * 2 + side, b: hit.bary[0] as f32, c: hit.bary[1] as f32 };

@@ -4,7 +4,7 @@
 use crate::gbuffer::{Hits, Lens};
 use crate::scene::Scene;
 use crate::shade::is_hole;
-use glam::DVec3;
+use glam::{DVec3, Vec3A};
 use obvhs::aabb::Aabb;
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::leaf_collapser::collapse;
@@ -197,24 +197,109 @@ impl<'a> Tracer<'a> {
         let ray = Ray::new(origin.as_vec3a(), direction.as_vec3a(), 0.0, f32::INFINITY);
         let mut best: Option<Hit> = None;
         // A RayHit carries its bound along: a fresh one for each ray.
-        boxes.ray_traverse(ray, &mut RayHit::none(), |_, i| {
-            let leaf = &leaves[i];
-            let Some((t, b, c, back)) = leaf.intersect(origin, direction) else { return f32::INFINITY };
-            if let Some(best) = &best {
-                let same = (t - best.t).abs() <= SAME * best.t;
-                if if same { leaf.triangle >= best.triangle } else { t > best.t } {
-                    return f32::INFINITY;
-                }
-            }
-            let bary = [b.clamp(0.0, 1.0), c.clamp(0.0, 1.0)];
-            if leaf.masked && is_hole(self.scene, leaf.triangle, bary) {
-                return f32::INFINITY;
-            }
-            best = Some(Hit { t, triangle: leaf.triangle, bary, back });
-            // Rounded up, so that boxes at the same distance are still visited.
-            (t * 1.00001) as f32
-        });
+        boxes.ray_traverse(ray, &mut RayHit::none(), |_, i| self.closer(&leaves[i], origin, direction, &mut best).unwrap_or(f32::INFINITY));
         best
+    }
+
+    /// The same of rays from one `origin` whose `directions` differ little: a box is fetched once for all of them, and tested side by side.
+    pub fn hits(&self, origin: DVec3, directions: &[DVec3; PACKET]) -> [Option<Hit>; PACKET] {
+        let mut best = [None; PACKET];
+        let Some(Hierarchy { boxes, leaves, centre }) = self.hierarchy.as_deref() else { return best };
+        let origin = origin - centre;
+        let mut packet = Packet::new(origin.as_vec3a(), directions);
+        let (mut stack, mut next) = (Vec::with_capacity(boxes.max_depth), boxes.nodes.first());
+        while let Some(node) = next {
+            let first = node.first_index as usize;
+            next = None;
+            if node.is_leaf() {
+                // Some may have hit something since.
+                let (rays, _) = packet.meets(node.aabb());
+                for leaf in &leaves[first..][..node.prim_count as usize] {
+                    for ray in (0..PACKET).filter(|ray| rays & 1 << ray != 0) {
+                        if let Some(farthest) = self.closer(leaf, origin, directions[ray], &mut best[ray]) {
+                            packet.farthest[ray] = farthest;
+                        }
+                    }
+                }
+            } else {
+                let children = [&boxes.nodes[first], &boxes.nodes[first + 1]];
+                let [(left, near), (right, far)] = children.map(|child| packet.meets(child.aabb()));
+                let [closer, other] = if near <= far { children } else { [children[1], children[0]] };
+                if left != 0 && right != 0 {
+                    stack.push((other, near.max(far)));
+                }
+                next = Some(closer).filter(|_| left != 0 || right != 0);
+            }
+            while next.is_none()
+                && let Some((node, near)) = stack.pop()
+            {
+                next = Some(node).filter(|_| packet.farthest.iter().any(|&farthest| near <= farthest));
+            }
+        }
+        best
+    }
+
+    /// Makes the hit of a ray with `leaf`, if any, the `best` one where it is closer: then the distance up to which boxes matter.
+    #[inline(always)]
+    fn closer(&self, leaf: &Leaf, origin: DVec3, direction: DVec3, best: &mut Option<Hit>) -> Option<f32> {
+        let (t, b, c, back) = leaf.intersect(origin, direction)?;
+        if let Some(best) = best {
+            let same = (t - best.t).abs() <= SAME * best.t;
+            if if same { leaf.triangle >= best.triangle } else { t > best.t } {
+                return None;
+            }
+        }
+        let bary = [b.clamp(0.0, 1.0), c.clamp(0.0, 1.0)];
+        if leaf.masked && is_hole(self.scene, leaf.triangle, bary) {
+            return None;
+        }
+        *best = Some(Hit { t, triangle: leaf.triangle, bary, back });
+        // Rounded up, so that boxes at the same distance are still visited.
+        Some((t * 1.00001) as f32)
+    }
+}
+
+/// Rays that are cast together.
+pub const PACKET: usize = 16;
+/// A direction's component counts as no smaller: a ray in a box's face has to stay in it.
+const LEVEL: f32 = 1e-20;
+
+/// Rays from one origin against boxes, a component after the other.
+struct Packet {
+    origin: [f32; 3],
+    inverse: [[f32; PACKET]; 3],
+    farthest: [f32; PACKET],
+}
+
+impl Packet {
+    fn new(origin: Vec3A, directions: &[DVec3; PACKET]) -> Self {
+        let inverse = |v: f64| 1.0 / (v.abs() as f32).max(LEVEL).copysign(v as f32);
+        let inverse = [0, 1, 2].map(|axis| directions.map(|direction| inverse(direction[axis])));
+        Self { origin: origin.to_array(), inverse, farthest: [f32::INFINITY; PACKET] }
+    }
+
+    /// Which of the rays come through the box before they have hit something, and how far the first of them goes to it.
+    #[inline(always)]
+    fn meets(&self, around: &Aabb) -> (u32, f32) {
+        let [lo, hi] = [around.min, around.max].map(|corner| corner.to_array());
+        // No `min` of two numbers: that asks about what is none, and is slower.
+        let (less, more) = (|a: f32, b: f32| if a < b { a } else { b }, |a: f32, b: f32| if a > b { a } else { b });
+        let (mut enter, mut leave) = ([0.0; PACKET], self.farthest);
+        for axis in 0..3 {
+            let [lo, hi] = [lo[axis] - self.origin[axis], hi[axis] - self.origin[axis]];
+            for ((&inverse, enter), leave) in self.inverse[axis].iter().zip(&mut enter).zip(&mut leave) {
+                let (a, b) = (lo * inverse, hi * inverse);
+                (*enter, *leave) = (more(*enter, less(a, b)), less(*leave, more(a, b)));
+            }
+        }
+        let mut rays = 0;
+        let mut first = f32::INFINITY;
+        for (ray, (&enter, &leave)) in enter.iter().zip(&leave).enumerate() {
+            let meets = enter <= leave;
+            rays |= u32::from(meets) << ray;
+            first = less(first, if meets { enter } else { f32::INFINITY });
+        }
+        (rays, first)
     }
 }
 

@@ -65,6 +65,20 @@ fn terrain(centre: DVec3, size: f64) -> Vec<Triangle> {
     quads(&(0..=100).map(|i| (0..=100).map(|j| point(i, j)).collect()).collect::<Vec<_>>())
 }
 
+/// What a ray hits, alone and among others.
+fn both(tracer: &Tracer<'_>, origin: DVec3, direction: DVec3) -> [Option<Hit>; 2] {
+    let directions = std::array::from_fn(|at| direction.lerp(DVec3::new(0.1, -0.9, 0.3), 0.01 * (at as f64 - 3.0)));
+    assert_eq!(directions[3], direction);
+    [tracer.hit(origin, direction), tracer.hits(origin, &directions)[3]]
+}
+
+/// The same, which has to be one.
+fn hit(tracer: &Tracer<'_>, origin: DVec3, direction: DVec3) -> Option<Hit> {
+    let [alone, among] = both(tracer, origin, direction);
+    assert_eq!(alone, among, "{origin} {direction}");
+    alone
+}
+
 /// Rays at corners and at points of edges; returns (rays, leaks). A hit farther than the target is a leak as well.
 fn aim(scene: &Scene, eye: DVec3, keep: impl Fn(DVec3) -> bool) -> (usize, usize) {
     let tracer = Tracer::new(scene);
@@ -79,7 +93,7 @@ fn aim(scene: &Scene, eye: DVec3, keep: impl Fn(DVec3) -> bool) -> (usize, usize
         .collect();
     let leaks = targets.par_iter().filter(|p| {
         let distance = p.distance(eye);
-        tracer.hit(eye, (**p - eye) / distance).is_none_or(|h| h.t > distance * (1.0 + 1e-6))
+        both(&tracer, eye, (**p - eye) / distance).into_iter().any(|hit| hit.is_none_or(|h| h.t > distance * (1.0 + 1e-6)))
     });
     (targets.len(), leaks.count())
 }
@@ -114,12 +128,12 @@ fn equal_distances_go_to_the_lowest_triangle() {
     let tracer = Tracer::new(&s);
     for i in 0..50 {
         let at = DVec3::new(f64::from(i % 7) * 0.1 - 0.7, f64::from(i / 7) * 0.1 - 0.7, 0.0);
-        let hit = tracer.hit(pose.eye, (at - pose.eye).normalize()).expect("a hit");
+        let hit = hit(&tracer, pose.eye, (at - pose.eye).normalize()).expect("a hit");
         assert_eq!((hit.triangle, hit.back), (0, false));
         let [p, q, r] = same;
         assert!((p * (1.0 - hit.bary[0] - hit.bary[1]) + q * hit.bary[0] + r * hit.bary[1]).distance(at) < 1e-9);
     }
-    assert!(tracer.hit(-pose.eye, DVec3::Z).expect("the back").back);
+    assert!(hit(&tracer, -pose.eye, DVec3::Z).expect("the back").back);
 }
 
 #[test]
@@ -132,7 +146,7 @@ fn cut_out_texels_are_passed_through() {
     s.materials.push(Material { texture: Some(0), alpha_cutoff: Some(0.5), ..Default::default() });
     s.triangles[0].material = 1;
     let tracer = Tracer::new(&s);
-    let at = |x: f64, y: f64| tracer.hit(DVec3::new(x, y, 3.0), DVec3::NEG_Z).map(|h| h.triangle);
+    let at = |x: f64, y: f64| hit(&tracer, DVec3::new(x, y, 3.0), DVec3::NEG_Z).map(|h| h.triangle);
     assert_eq!([at(0.2, 0.2), at(0.7, 0.1), at(0.1, 0.7), at(0.9, 0.9)], [Some(0), Some(1), Some(1), None]);
 }
 
@@ -151,7 +165,7 @@ fn pixels_outside_the_scenes_rectangle_are_background() {
     let hits = Hits::cast(&s, &tracer, &|_, _| {});
     let lens = Lens::new(&s, 0);
     for (i, sample) in hits.samples.iter().take(64 * 48).enumerate() {
-        let hit = tracer.hit(lens.eye, lens.direction((i % 64) as f64 + 0.5, (i / 64) as f64 + 0.5));
+        let hit = hit(&tracer, lens.eye, lens.direction((i % 64) as f64 + 0.5, (i / 64) as f64 + 0.5));
         assert_eq!(hit.is_some(), sample.surface != crate::gbuffer::BACKGROUND, "pixel {i}");
     }
 }

@@ -4,12 +4,12 @@
 use crate::gbuffer::Lens;
 use crate::scene::Scene;
 use crate::shade::Shader;
-use crate::trace::Tracer;
+use crate::trace::{Hit, PACKET, Tracer};
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// Samples along each side of a pixel.
-const SIDE: u32 = 4;
+/// Samples along each side of a pixel: as many in all as are cast together.
+const SIDE: usize = PACKET.isqrt();
 
 /// A scene ready to be rendered.
 pub struct Truth<'a> {
@@ -40,13 +40,12 @@ impl<'a> Truth<'a> {
         let mut picture = vec![0u8; width * height * 3];
         picture.par_chunks_mut((width * 3).max(1)).enumerate().for_each(|(y, row)| {
             for (x, pixel) in row.as_chunks_mut::<3>().0.iter_mut().enumerate() {
-                let mut sum = Vec3::ZERO;
-                for sample in 0..SIDE * SIDE {
-                    let offset = |i: u32| (f64::from(i) + 0.5) / f64::from(SIDE);
-                    sum += self.sample(&lens, x as f64 + offset(sample % SIDE), y as f64 + offset(sample / SIDE));
-                }
+                let offset = |i: usize| (i as f64 + 0.5) / SIDE as f64;
+                let places: [[f64; 2]; PACKET] = std::array::from_fn(|at| [x as f64 + offset(at % SIDE), y as f64 + offset(at / SIDE)]);
+                let hits = self.tracer.hits(lens.eye, &places.map(|[x, y]| lens.direction(x, y)));
+                let sum = hits.into_iter().zip(places).map(|(hit, place)| self.colour(hit, place)).sum::<Vec3>();
                 // Colours are at most 255 a component: the mean fits a byte.
-                *pixel = (sum / (SIDE * SIDE) as f32).to_array().map(|v| (v + 0.5) as u8);
+                *pixel = (sum / PACKET as f32).to_array().map(|v| (v + 0.5) as u8);
             }
         });
         picture
@@ -57,8 +56,8 @@ impl<'a> Truth<'a> {
         spread(self.scene.playback.frames, most).into_iter().map(|frame| (frame, self.frame(frame))).collect()
     }
 
-    fn sample(&self, lens: &Lens, x: f64, y: f64) -> Vec3 {
-        match self.tracer.hit(lens.eye, lens.direction(x, y)) {
+    fn colour(&self, hit: Option<Hit>, [x, y]: [f64; 2]) -> Vec3 {
+        match hit {
             // The side matters to lit materials only, and the shader asks for it there only.
             Some(hit) => self.shader.shade(hit.triangle * 2 + u32::from(hit.back), hit.bary, 0.0),
             None => self.shader.background(x, y),
