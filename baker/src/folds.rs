@@ -8,6 +8,7 @@ use crate::joins::root;
 use crate::sheets::KeyGrid;
 use crate::tears::{DOWN, NEXT, RIGHT};
 use rayon::prelude::*;
+use std::cmp::Reverse;
 
 /// The label of a pixel that belongs to no sheet: a part too small to keep.
 pub const NONE: u16 = u16::MAX;
@@ -45,7 +46,7 @@ pub fn unfold(gbuffer: &GBuffer, tears: &[u8], grid: &KeyGrid, labels: &[Label],
     for (label, sizes) in sizes.iter().enumerate() {
         wanted.extend((1..PARTS).filter(|&part| sizes[part] > 0).map(|part| (sizes[part], label, part)));
     }
-    wanted.sort_by_key(|&(size, label, part)| (std::cmp::Reverse(size), label, part));
+    wanted.sort_by_key(|&(size, label, part)| (Reverse(size), label, part));
     let mut alias: Vec<[u16; PARTS]> = (0..labels.len()).map(|label| [label as u16; PARTS]).collect();
     for &(_, label, part) in wanted.iter().take(MOST_LABELS.saturating_sub(labels.len())) {
         alias[label][part] = folded.labels.len() as u16;
@@ -67,17 +68,12 @@ struct Parts {
 
 impl Parts {
     fn find(gbuffer: &GBuffer, tears: &[u8], grid: &KeyGrid, least: u32) -> Self {
-        let cells = grid.grid.cells();
-        let torn = (0..grid.intervals() * cells)
-            .into_par_iter()
-            .filter_map(|index| {
-                let block = Block::new(grid, index / cells, index % cells);
-                let inside = |pixel: usize, place: usize| block.steps(place).iter().any(|&(bit, _, _)| tears[pixel] & bit != 0);
-                let any = block.pixels(grid).enumerate().any(|(place, pixel)| tears[pixel] != 0 && inside(pixel, place));
-                any.then(|| (index, block.parts(gbuffer, tears, grid, least)))
-            })
-            .collect();
-        Self { torn }
+        let find = |index: usize| {
+            let block = Block::new(grid, index);
+            let any = block.torn(tears, grid).next().is_some();
+            any.then(|| (index, block.parts(gbuffer, tears, grid, least)))
+        };
+        Self { torn: (0..grid.intervals() * grid.grid.cells()).into_par_iter().filter_map(find).collect() }
     }
 
     /// A part number for every pixel, the same across cells as far as they agree; `None` where nothing is torn.
@@ -85,24 +81,42 @@ impl Parts {
         if self.torn.is_empty() {
             return None;
         }
+        let torn = self.torn.par_iter().flat_map_iter(|&(index, _)| {
+            let mut labels: Vec<u16> = Block::new(grid, index).torn(tears, grid).map(|pixel| gbuffer.label[pixel]).collect();
+            labels.dedup();
+            labels
+        });
         let mut folding = vec![false; 1 << 16];
-        for (index, _) in &self.torn {
-            let block = Block::new(grid, index / grid.grid.cells(), index % grid.grid.cells());
-            for (place, pixel) in block.pixels(grid).enumerate() {
-                if block.steps(place).iter().any(|&(bit, _, _)| tears[pixel] & bit != 0) {
-                    folding[usize::from(gbuffer.label[pixel])] = true;
-                }
-            }
-        }
+        torn.collect::<Vec<u16>>().into_iter().for_each(|label| folding[usize::from(label)] = true);
+        let all: Vec<usize> = (0..grid.intervals() * grid.grid.cells()).collect();
         let mut part = vec![0u8; gbuffer.label.len()];
-        let mut torn = self.torn.iter().peekable();
-        for index in 0..grid.intervals() * grid.grid.cells() {
-            let own = torn.next_if(|(at, _)| *at == index).map(|(_, parts)| parts.as_slice());
-            let block = Block::new(grid, index / grid.grid.cells(), index % grid.grid.cells());
-            block.adopt(gbuffer, tears, grid, &folding, own, &mut part);
+        // What every cell has can be told at once, but not which numbers its parts get: those go by what cells before it have.
+        for some in all.chunks(grid.grid.cells()) {
+            let has = some.par_iter().map(|&index| {
+                let own = self.torn.binary_search_by_key(&index, |&(at, _)| at).ok().map(|at| self.torn[at].1.as_slice());
+                let block = Block::new(grid, index);
+                let has = block.has(gbuffer, grid, &folding, own)?;
+                Some((block, has))
+            });
+            for (block, has) in has.collect::<Vec<_>>().into_iter().flatten() {
+                block.adopt(gbuffer, tears, grid, &folding, &has, &mut part);
+            }
         }
         Some(part)
     }
+}
+
+/// A part of a label in a cell and interval.
+struct Part {
+    label: u16,
+    part: u32,
+    pixels: u32,
+}
+
+/// The parts of a cell and interval, and which of them each pixel is of, frame by frame and row by row: `None` where it was too small.
+struct Has {
+    parts: Vec<Part>,
+    of: Vec<Option<u16>>,
 }
 
 /// The pixels of one cell and interval.
@@ -116,7 +130,9 @@ struct Block {
 }
 
 impl Block {
-    fn new(grid: &KeyGrid, interval: usize, cell: usize) -> Self {
+    /// That of `index`: interval times cells plus cell.
+    fn new(grid: &KeyGrid, index: usize) -> Self {
+        let (interval, cell) = (index / grid.grid.cells(), index % grid.grid.cells());
         let [columns, rows] = grid.pixels(cell);
         let size = [columns.len(), rows.len(), grid.frames_of(interval).len()];
         Self { interval, cell, size, stride: [grid.size[0], grid.size[0] * grid.size[1]] }
@@ -132,20 +148,19 @@ impl Block {
     }
 
     /// The steps from the pixel at `place` that stay inside: the tear that would stand in the way, and how far it is here and in the G-buffer.
-    fn steps(&self, place: usize) -> Vec<(u8, usize, usize)> {
+    fn steps(&self, place: usize) -> impl Iterator<Item = (u8, usize, usize)> {
         let [width, height, frames] = self.size;
         let (x, y, f) = (place % width, place / width % height, place / (width * height));
-        let mut steps = Vec::with_capacity(3);
-        if x + 1 < width {
-            steps.push((RIGHT, 1, 1));
-        }
-        if y + 1 < height {
-            steps.push((DOWN, width, self.stride[0]));
-        }
-        if f + 1 < frames {
-            steps.push((NEXT, width * height, self.stride[1]));
-        }
-        steps
+        let right = (x + 1 < width).then_some((RIGHT, 1, 1));
+        let down = (y + 1 < height).then_some((DOWN, width, self.stride[0]));
+        let next = (f + 1 < frames).then_some((NEXT, width * height, self.stride[1]));
+        right.into_iter().chain(down).chain(next)
+    }
+
+    /// The pixels here, by their place, that are torn from one further on.
+    fn torn(&self, tears: &[u8], grid: &KeyGrid) -> impl Iterator<Item = usize> {
+        let torn = |&(place, pixel): &(usize, usize)| tears[pixel] != 0 && self.steps(place).any(|(bit, _, _)| tears[pixel] & bit != 0);
+        self.pixels(grid).enumerate().filter(torn).map(|(_, pixel)| pixel)
     }
 
     /// Connected parts of each label; those of fewer than `least` pixels are given up, but never all of them: a cell has to show something.
@@ -169,35 +184,43 @@ impl Block {
         roots.iter().map(|&root| if count[root as usize] >= least { root } else { GIVEN_UP }).collect()
     }
 
+    /// The parts of each label here, if any label folds; `own`: the part of each pixel.
+    fn has(&self, gbuffer: &GBuffer, grid: &KeyGrid, folding: &[bool], own: Option<&[u32]>) -> Option<Has> {
+        if !self.pixels(grid).any(|pixel| folding[usize::from(gbuffer.label[pixel])]) {
+            return None;
+        }
+        let mut parts: Vec<Part> = Vec::new();
+        let of = |(place, pixel): (usize, usize)| {
+            let (label, part) = (gbuffer.label[pixel], own.map_or(0, |own| own[place]));
+            if part == GIVEN_UP {
+                return None;
+            }
+            let at = parts.iter().position(|known| (known.label, known.part) == (label, part)).unwrap_or_else(|| {
+                parts.push(Part { label, part, pixels: 0 });
+                parts.len() - 1
+            });
+            parts[at].pixels += 1;
+            Some(at as u16)
+        };
+        let of = self.pixels(grid).enumerate().map(of).collect();
+        Some(Has { parts, of })
+    }
+
     /// Gives every part the number that most of its neighbours already have, to the left, above and before; parts of one label
     /// in the cell get different ones.
-    fn adopt(&self, gbuffer: &GBuffer, tears: &[u8], grid: &KeyGrid, folding: &[bool], own: Option<&[u32]>, part: &mut [u8]) {
-        let pixels: Vec<usize> = self.pixels(grid).collect();
-        if !pixels.iter().any(|&pixel| folding[usize::from(gbuffer.label[pixel])]) {
-            return;
-        }
+    fn adopt(&self, gbuffer: &GBuffer, tears: &[u8], grid: &KeyGrid, folding: &[bool], has: &Has, part: &mut [u8]) {
         let [width, height, _] = self.size;
-        // Label and part here, pixels, votes.
-        let mut found: Vec<(u16, u32, u32, [u32; PARTS])> = Vec::new();
-        let key = |place: usize| (gbuffer.label[pixels[place]], own.map_or(0, |own| own[place]));
-        for (place, &pixel) in pixels.iter().enumerate() {
-            let (label, here) = key(place);
-            if here == GIVEN_UP {
-                continue;
-            }
-            let at = found.iter().position(|&(l, p, ..)| (l, p) == (label, here)).unwrap_or_else(|| {
-                found.push((label, here, 0, [0; PARTS]));
-                found.len() - 1
-            });
-            found[at].2 += 1;
+        let mut found: Vec<(&Part, [u32; PARTS])> = has.parts.iter().map(|part| (part, [0; PARTS])).collect();
+        for ((place, pixel), &of) in self.pixels(grid).enumerate().zip(&has.of) {
+            let Some((of, votes)) = of.map(|of| &mut found[usize::from(of)]) else { continue };
             let (x, y, f) = (place % width, place / width % height, place / (width * height));
             let mut ask = |edge: bool, back: usize, bit: u8| {
                 if let Some(other) = pixel.checked_sub(back).filter(|_| edge)
-                    && gbuffer.label[other] == label
+                    && gbuffer.label[other] == of.label
                     && tears[other] & bit == 0
                     && usize::from(part[other]) < PARTS
                 {
-                    found[at].3[usize::from(part[other])] += 1;
+                    votes[usize::from(part[other])] += 1;
                 }
             };
             let column = pixel % self.stride[0];
@@ -206,20 +229,22 @@ impl Block {
             ask(f == 0, self.stride[1], NEXT);
         }
         // Those who are surest choose first; then the larger ones.
-        found.sort_by_key(|&(label, here, pixels, votes)| {
-            (std::cmp::Reverse(votes.iter().copied().max()), std::cmp::Reverse(pixels), label, here)
+        let mut order: Vec<usize> = (0..found.len()).collect();
+        order.sort_by_key(|&at| {
+            let (of, votes) = &found[at];
+            (Reverse(votes.iter().copied().max()), Reverse(of.pixels), of.label, of.part)
         });
-        let mut chosen: Vec<((u16, u32), u8)> = Vec::new();
-        for &(label, here, _, votes) in &found {
-            let taken = |number: usize| chosen.iter().any(|&((l, _), n)| l == label && usize::from(n) == number);
-            let free = (0..PARTS).filter(|&number| !taken(number));
-            let number = free.max_by_key(|&number| (votes[number], std::cmp::Reverse(number)));
-            chosen.push(((label, here), number.map_or(u8::MAX, |number| number as u8)));
+        let mut chosen = vec![u8::MAX; found.len()];
+        for (turn, &at) in order.iter().enumerate() {
+            let (of, votes) = found[at];
+            let taken =
+                |number: usize| order[..turn].iter().any(|&other| found[other].0.label == of.label && usize::from(chosen[other]) == number);
+            let number = (0..PARTS).filter(|&number| !taken(number)).max_by_key(|&number| (votes[number], Reverse(number)));
+            chosen[at] = number.map_or(u8::MAX, |number| number as u8);
         }
-        for (place, &pixel) in pixels.iter().enumerate() {
-            let (label, here) = key(place);
-            let number = chosen.iter().find(|&&(who, _)| who == (label, here)).map_or(u8::MAX, |&(_, number)| number);
-            part[pixel] = if folding[usize::from(label)] { number } else { 0 };
+        for (pixel, of) in self.pixels(grid).zip(&has.of) {
+            let number = of.map_or(u8::MAX, |of| chosen[usize::from(of)]);
+            part[pixel] = if folding[usize::from(gbuffer.label[pixel])] { number } else { 0 };
         }
     }
 }
