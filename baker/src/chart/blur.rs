@@ -49,12 +49,14 @@ impl Seen {
         };
         let mut pixels: Vec<(u64, u32)> = self.0.par_iter().map(place).collect();
         pixels.par_sort_unstable_by_key(|pixel| pixel.0);
-        let mut losses = vec![Loss::default(); densities.len()];
-        for chart in pixels.chunk_by(|a, b| a.0 >> (2 * SIDE) == b.0 >> (2 * SIDE)) {
+        let of = |chart: &[(u64, u32)]| {
             let kept: [f64; COARSER + 1] = std::array::from_fn(|octave| kept(chart, 2 * octave as u32));
-            let of = |octave: usize| (kept[0] - kept[octave]).max(0.0) / (3 * chart.len()) as f64;
-            losses[(chart[0].0 >> (2 * SIDE)) as usize] = Loss(std::array::from_fn(of));
-        }
+            let loss = |octave: usize| (kept[0] - kept[octave]).max(0.0) / (3 * chart.len()) as f64;
+            ((chart[0].0 >> (2 * SIDE)) as usize, Loss(std::array::from_fn(loss)))
+        };
+        let charts = pixels.par_chunk_by(|a, b| a.0 >> (2 * SIDE) == b.0 >> (2 * SIDE)).map(of);
+        let mut losses = vec![Loss::default(); densities.len()];
+        charts.collect::<Vec<_>>().into_iter().for_each(|(chart, loss)| losses[chart] = loss);
         losses
     }
 }

@@ -16,6 +16,8 @@ const FILL: f64 = 0.7;
 const TURNS: usize = 32;
 /// Charts in all tables together, at most, while there are two tables: 3 kB each.
 const TABLES: usize = 100_000;
+/// As many chunks keep two dozen threads busy.
+const MOST_CHUNKS: usize = 24;
 /// Histogram bins: [`OCTAVE`] an octave of single-precision numbers from 2^-40 to 2^40.
 const BINS: usize = 640;
 const OCTAVE: usize = 8;
@@ -91,8 +93,8 @@ pub(super) fn measure(scene: &Scene, hits: &Hits, seen: Option<&Seen>, charting:
         [libm::cos(angle), libm::sin(angle)]
     });
     let frame_size = (hits.width * hits.height) as usize;
-    // As many chunks as keep two dozen threads busy, few enough to hold a table of charts each. Whatever they are, the sums are the same.
-    let chunks = (TABLES / charting.charts.len().max(1)).clamp(2, 24);
+    // Few enough chunks to hold a table of charts each. Whatever they are, the sums are the same.
+    let chunks = (TABLES / charting.charts.len().max(1)).clamp(2, MOST_CHUNKS);
     let chunk = (hits.frames as usize).div_ceil(chunks).max(1) * frame_size;
     let tables: Vec<Vec<Option<Box<Figures>>>> = hits
         .samples
@@ -204,18 +206,25 @@ fn snap(charting: &mut Charting) {
 
 /// Sets the bounds and hits of charts whose projection and density stand.
 pub(super) fn bound(hits: &Hits, charting: &mut Charting) {
-    for chart in &mut charting.charts {
-        (chart.lo, chart.hi, chart.hits) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2], 0);
-    }
-    for s in hits.samples.iter().filter(|s| s.surface != BACKGROUND) {
-        let id = charting.faces.of[s.surface as usize] as usize;
-        let flat = charting.flat(id, f64::from(s.b), f64::from(s.c));
-        let chart = &mut charting.charts[charting.chart_of[id] as usize];
-        for ((lo, hi), v) in chart.lo.iter_mut().zip(&mut chart.hi).zip(flat) {
-            *lo = lo.min(v);
-            *hi = hi.max(v);
+    let none = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2], 0u64);
+    let join = |(lo, hi, hits): &mut ([f64; 2], [f64; 2], u64), (other_lo, other_hi, other_hits): ([f64; 2], [f64; 2], u64)| {
+        (*lo, *hi) = ([0, 1].map(|k| lo[k].min(other_lo[k])), [0, 1].map(|k| hi[k].max(other_hi[k])));
+        *hits += other_hits;
+    };
+    let chunk = hits.samples.len().div_ceil(MOST_CHUNKS).max(1);
+    let tables = hits.samples.par_chunks(chunk).map(|samples| {
+        let mut table = vec![none; charting.charts.len()];
+        for s in samples.iter().filter(|s| s.surface != BACKGROUND) {
+            let id = charting.faces.of[s.surface as usize] as usize;
+            let [u, v, _] = charting.flat(id, f64::from(s.b), f64::from(s.c));
+            join(&mut table[charting.chart_of[id] as usize], ([u, v], [u, v], 1));
         }
-        chart.hits += 1;
+        table
+    });
+    let mut bounds = vec![none; charting.charts.len()];
+    tables.collect::<Vec<_>>().into_iter().for_each(|table| bounds.iter_mut().zip(table).for_each(|(all, part)| join(all, part)));
+    for (chart, bounds) in charting.charts.iter_mut().zip(bounds) {
+        (chart.lo, chart.hi, chart.hits) = bounds;
     }
     snap(charting);
 }
