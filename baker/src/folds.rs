@@ -116,7 +116,7 @@ struct Part {
 /// The parts of a cell and interval, and which of them each pixel is of, frame by frame and row by row: `None` where it was too small.
 struct Has {
     parts: Vec<Part>,
-    of: Vec<Option<u16>>,
+    of: Vec<Option<u32>>,
 }
 
 /// The pixels of one cell and interval.
@@ -200,7 +200,7 @@ impl Block {
                 parts.len() - 1
             });
             parts[at].pixels += 1;
-            Some(at as u16)
+            Some(at as u32)
         };
         let of = self.pixels(grid).enumerate().map(of).collect();
         Some(Has { parts, of })
@@ -212,7 +212,7 @@ impl Block {
         let [width, height, _] = self.size;
         let mut found: Vec<(&Part, [u32; PARTS])> = has.parts.iter().map(|part| (part, [0; PARTS])).collect();
         for ((place, pixel), &of) in self.pixels(grid).enumerate().zip(&has.of) {
-            let Some((of, votes)) = of.map(|of| &mut found[usize::from(of)]) else { continue };
+            let Some((of, votes)) = of.map(|of| &mut found[of as usize]) else { continue };
             let (x, y, f) = (place % width, place / width % height, place / (width * height));
             let mut ask = |edge: bool, back: usize, bit: u8| {
                 if let Some(other) = pixel.checked_sub(back).filter(|_| edge)
@@ -243,7 +243,7 @@ impl Block {
             chosen[at] = number.map_or(u8::MAX, |number| number as u8);
         }
         for (pixel, of) in self.pixels(grid).zip(&has.of) {
-            let number = of.map_or(u8::MAX, |of| chosen[usize::from(of)]);
+            let number = of.map_or(u8::MAX, |of| chosen[of as usize]);
             part[pixel] = if folding[usize::from(gbuffer.label[pixel])] { number } else { 0 };
         }
     }
