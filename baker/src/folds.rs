@@ -92,31 +92,60 @@ impl Parts {
         let mut part = vec![0u8; gbuffer.label.len()];
         // What every cell has can be told at once, but not which numbers its parts get: those go by what cells before it have.
         for some in all.chunks(grid.grid.cells()) {
-            let has = some.par_iter().map(|&index| {
+            let has = some.par_iter().filter_map(|&index| {
                 let own = self.torn.binary_search_by_key(&index, |&(at, _)| at).ok().map(|at| self.torn[at].1.as_slice());
-                let block = Block::new(grid, index);
-                let has = block.has(gbuffer, grid, &folding, own)?;
-                Some((block, has))
+                Block::new(grid, index).has(gbuffer, tears, grid, &folding, own)
             });
-            for (block, has) in has.collect::<Vec<_>>().into_iter().flatten() {
-                block.adopt(gbuffer, tears, grid, &folding, &has, &mut part);
-            }
+            has.collect::<Vec<_>>().iter().for_each(|has| has.adopt(gbuffer, &folding, &mut part));
         }
         Some(part)
     }
 }
 
 /// A part of a label in a cell and interval.
+#[derive(Clone, Copy)]
 struct Part {
     label: u16,
     part: u32,
     pixels: u32,
 }
 
-/// The parts of a cell and interval, and which of them each pixel is of, frame by frame and row by row: `None` where it was too small.
+/// The parts of a cell and interval.
 struct Has {
     parts: Vec<Part>,
-    of: Vec<Option<u32>>,
+    /// The G-buffer's pixels, frame by frame and row by row, and which part each is of: `None` where that was too small.
+    of: Vec<(usize, Option<u32>)>,
+    /// Pixels to the left, above and before from which a part goes on, and which.
+    from: Vec<(usize, u32)>,
+}
+
+impl Has {
+    /// Gives every part the number that most of its neighbours already have; parts of one label get different ones.
+    fn adopt(&self, gbuffer: &GBuffer, folding: &[bool], part: &mut [u8]) {
+        let mut votes = vec![[0u32; PARTS]; self.parts.len()];
+        for &(other, of) in &self.from {
+            if let Some(votes) = votes[of as usize].get_mut(usize::from(part[other])) {
+                *votes += 1;
+            }
+        }
+        // Those who are surest choose first; then the larger ones.
+        let mut order: Vec<usize> = (0..self.parts.len()).collect();
+        order.sort_by_key(|&at| {
+            let Part { label, part, pixels } = self.parts[at];
+            (Reverse(votes[at].iter().copied().max()), Reverse(pixels), label, part)
+        });
+        let mut chosen = vec![u8::MAX; self.parts.len()];
+        for (turn, &at) in order.iter().enumerate() {
+            let before = order[..turn].iter().filter(|&&other| self.parts[other].label == self.parts[at].label);
+            let taken = |number: usize| before.clone().any(|&other| usize::from(chosen[other]) == number);
+            let number = (0..PARTS).filter(|&number| !taken(number)).max_by_key(|&number| (votes[at][number], Reverse(number)));
+            chosen[at] = number.map_or(u8::MAX, |number| number as u8);
+        }
+        for &(pixel, of) in &self.of {
+            let number = of.map_or(u8::MAX, |of| chosen[of as usize]);
+            part[pixel] = if folding[usize::from(gbuffer.label[pixel])] { number } else { 0 };
+        }
+    }
 }
 
 /// The pixels of one cell and interval.
@@ -185,42 +214,31 @@ impl Block {
     }
 
     /// The parts of each label here, if any label folds; `own`: the part of each pixel.
-    fn has(&self, gbuffer: &GBuffer, grid: &KeyGrid, folding: &[bool], own: Option<&[u32]>) -> Option<Has> {
+    fn has(&self, gbuffer: &GBuffer, tears: &[u8], grid: &KeyGrid, folding: &[bool], own: Option<&[u32]>) -> Option<Has> {
         if !self.pixels(grid).any(|pixel| folding[usize::from(gbuffer.label[pixel])]) {
             return None;
         }
-        let mut parts: Vec<Part> = Vec::new();
-        let of = |(place, pixel): (usize, usize)| {
+        let [width, height, _] = self.size;
+        let mut has = Has { parts: Vec::new(), of: Vec::with_capacity(self.size.iter().product()), from: Vec::new() };
+        for (place, pixel) in self.pixels(grid).enumerate() {
             let (label, part) = (gbuffer.label[pixel], own.map_or(0, |own| own[place]));
             if part == GIVEN_UP {
-                return None;
+                has.of.push((pixel, None));
+                continue;
             }
-            let at = parts.iter().position(|known| (known.label, known.part) == (label, part)).unwrap_or_else(|| {
-                parts.push(Part { label, part, pixels: 0 });
-                parts.len() - 1
+            let at = has.parts.iter().position(|known| (known.label, known.part) == (label, part)).unwrap_or_else(|| {
+                has.parts.push(Part { label, part, pixels: 0 });
+                has.parts.len() - 1
             });
-            parts[at].pixels += 1;
-            Some(at as u32)
-        };
-        let of = self.pixels(grid).enumerate().map(of).collect();
-        Some(Has { parts, of })
-    }
-
-    /// Gives every part the number that most of its neighbours already have, to the left, above and before; parts of one label
-    /// in the cell get different ones.
-    fn adopt(&self, gbuffer: &GBuffer, tears: &[u8], grid: &KeyGrid, folding: &[bool], has: &Has, part: &mut [u8]) {
-        let [width, height, _] = self.size;
-        let mut found: Vec<(&Part, [u32; PARTS])> = has.parts.iter().map(|part| (part, [0; PARTS])).collect();
-        for ((place, pixel), &of) in self.pixels(grid).enumerate().zip(&has.of) {
-            let Some((of, votes)) = of.map(|of| &mut found[of as usize]) else { continue };
+            has.parts[at].pixels += 1;
+            has.of.push((pixel, Some(at as u32)));
             let (x, y, f) = (place % width, place / width % height, place / (width * height));
             let mut ask = |edge: bool, back: usize, bit: u8| {
                 if let Some(other) = pixel.checked_sub(back).filter(|_| edge)
-                    && gbuffer.label[other] == of.label
+                    && gbuffer.label[other] == label
                     && tears[other] & bit == 0
-                    && usize::from(part[other]) < PARTS
                 {
-                    votes[usize::from(part[other])] += 1;
+                    has.from.push((other, at as u32));
                 }
             };
             let column = pixel % self.stride[0];
@@ -228,24 +246,7 @@ impl Block {
             ask(y == 0 && pixel % self.stride[1] >= self.stride[0], self.stride[0], DOWN);
             ask(f == 0, self.stride[1], NEXT);
         }
-        // Those who are surest choose first; then the larger ones.
-        let mut order: Vec<usize> = (0..found.len()).collect();
-        order.sort_by_key(|&at| {
-            let (of, votes) = &found[at];
-            (Reverse(votes.iter().copied().max()), Reverse(of.pixels), of.label, of.part)
-        });
-        let mut chosen = vec![u8::MAX; found.len()];
-        for (turn, &at) in order.iter().enumerate() {
-            let (of, votes) = found[at];
-            let taken =
-                |number: usize| order[..turn].iter().any(|&other| found[other].0.label == of.label && usize::from(chosen[other]) == number);
-            let number = (0..PARTS).filter(|&number| !taken(number)).max_by_key(|&number| (votes[number], Reverse(number)));
-            chosen[at] = number.map_or(u8::MAX, |number| number as u8);
-        }
-        for (pixel, of) in self.pixels(grid).zip(&has.of) {
-            let number = of.map_or(u8::MAX, |of| chosen[of as usize]);
-            part[pixel] = if folding[usize::from(gbuffer.label[pixel])] { number } else { 0 };
-        }
+        Some(has)
     }
 }
 
