@@ -186,7 +186,7 @@ impl Block {
         right.into_iter().chain(down).chain(next)
     }
 
-    /// The pixels here, by their place, that are torn from one further on.
+    /// The G-buffer's pixels here that are torn from one further on.
     fn torn(&self, tears: &[u8], grid: &KeyGrid) -> impl Iterator<Item = usize> {
         let torn = |&(place, pixel): &(usize, usize)| tears[pixel] != 0 && self.steps(place).any(|(bit, _, _)| tears[pixel] & bit != 0);
         self.pixels(grid).enumerate().filter(torn).map(|(_, pixel)| pixel)

@@ -10,6 +10,7 @@ use rayon::prelude::*;
 
 /// Samples along each side of a pixel: as many in all as are cast together.
 const SIDE: usize = PACKET.isqrt();
+const _: () = assert!(SIDE * SIDE == PACKET);
 
 /// A scene ready to be rendered.
 pub struct Truth<'a> {
