@@ -88,11 +88,10 @@ impl Parts {
         });
         let mut folding = vec![false; 1 << 16];
         torn.collect::<Vec<u16>>().into_iter().for_each(|label| folding[usize::from(label)] = true);
-        let all: Vec<usize> = (0..grid.intervals() * grid.grid.cells()).collect();
-        let mut part = vec![0u8; gbuffer.label.len()];
+        let (cells, mut part) = (grid.grid.cells(), vec![0u8; gbuffer.label.len()]);
         // What every cell has can be told at once, but not which numbers its parts get: those go by what cells before it have.
-        for some in all.chunks(grid.grid.cells()) {
-            let has = some.par_iter().filter_map(|&index| {
+        for interval in 0..grid.intervals() {
+            let has = (interval * cells..(interval + 1) * cells).into_par_iter().filter_map(|index| {
                 let own = self.torn.binary_search_by_key(&index, |&(at, _)| at).ok().map(|at| self.torn[at].1.as_slice());
                 Block::new(grid, index).has(gbuffer, tears, grid, &folding, own)
             });
