@@ -1,7 +1,7 @@
 //! The whole line: a scene in, a bundle out.
 //! The stages are the crate's modules; this runs them in order, times them, and reports progress.
 
-use crate::atlas::{self, Atlas, AtlasError, SourceImage};
+use crate::atlas::{self, Atlas, AtlasError, SourceImage, Storage};
 use crate::cast::Cast;
 use crate::causes::{self, Causes};
 use crate::chart;
@@ -303,7 +303,13 @@ pub fn settled(scene: &Scene, flat: &Flat, fitted: &Fitted, settings: &Settings,
     let code = |coding: CodingSettings| -> Result<Vec<u8>, BakeError> { Ok(encode::bundle(&content, coding, header)?) };
     let bundle = match settings.sparing {
         Sparing::Nothing => code(settings.coding)?,
-        Sparing::Unseen => spare::unseen(&flat.atlas, encode::image_bytes(image, settings.atlas.storage), settings.coding, code)?,
+        Sparing::Unseen => {
+            // To pack the same picture for each, and to unpack it for each player, would take longer than all else.
+            let raw = encode::Header { storage: Storage::Raw, ..header };
+            let try_raw = |coding: CodingSettings| -> Result<Vec<u8>, BakeError> { Ok(encode::bundle(&content, coding, raw)?) };
+            let (bundle, coding) = spare::unseen(&flat.atlas, encode::image_bytes(image, Storage::Raw), settings.coding, try_raw)?;
+            if header.storage == Storage::Raw { bundle } else { code(coding)? }
+        }
         Sparing::Within(bytes) => spare::within(bytes, |lambda| code(settings.coding.worth(lambda)))?,
     };
     progress("coding keys", 1.0);

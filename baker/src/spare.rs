@@ -37,8 +37,8 @@ impl Coarser {
     }
 }
 
-/// The bundle among those that `code` makes, of settings as coarse as `finest` or coarser, that is worth most; `picture`: bytes that are not keys. What a
-/// bit is worth grows first, then the steps that positions are coded in, each as long as coarser is better.
+/// The bundle among those that `code` makes, of settings as coarse as `finest` or coarser, that is worth most, and its settings; `picture`: bytes that are
+/// not keys. What a bit is worth grows first, then the steps that positions are coded in, each as long as coarser is better.
 ///
 /// # Errors
 /// Those of `code`, and [`VerifyError`] where the player refuses a bundle.
@@ -47,7 +47,7 @@ pub(crate) fn unseen<E: From<VerifyError> + Send>(
     picture: usize,
     finest: CodingSettings,
     code: impl Fn(CodingSettings) -> Result<Vec<u8>, E> + Sync,
-) -> Result<Vec<u8>, E> {
+) -> Result<(Vec<u8>, CodingSettings), E> {
     let frames = spread(atlas.gbuffer.frames, COMPARED);
     let exact: Vec<(u32, Vec<u8>)> = frames.into_iter().map(|frame| (frame, verify::exact_frame(atlas, frame))).collect();
     type Measured = (f64, Vec<u8>, CodingSettings);
@@ -71,7 +71,7 @@ pub(crate) fn unseen<E: From<VerifyError> + Send>(
             }
         }
     }
-    Ok(best.map_or_else(Vec::new, |best| best.1))
+    Ok(best.map_or((Vec::new(), finest), |(_, bundle, coding)| (bundle, coding)))
 }
 
 /// The finest bundle among those that `code` makes, at what a bit is worth, that has at most so many `bytes`, within half a rung of the ladder that

@@ -19,6 +19,8 @@ use thiserror::Error;
 
 /// Frames that one player plays in a row while others play the rest.
 const RUN: u32 = 16;
+/// Likewise of frames far apart: a player that is new to a path decodes all that leads to the frame, and unpacks a packed picture first.
+const FAR_RUN: usize = 8;
 
 /// Why a finished bundle cannot be verified: always the baker's fault.
 #[derive(Clone, Debug, Error, PartialEq)]
@@ -183,6 +185,16 @@ fn with_screen<R>(bundle: &Bundle<'_>, then: impl FnOnce(Screen<'_, '_>) -> R) -
     let mut memory = vec![0; bundle.memory_needed()];
     let mut player = Player::<AnyTexels>::with_texels(bundle, &mut memory)?;
     Ok(then(Screen::new(&mut player)))
+}
+
+/// What `of` finds for each of `items`, frames of `bundle` with whatever belongs to them, ascending: in runs of [`FAR_RUN`], with a player each.
+fn in_runs<T: Sync, R: Send>(
+    bundle: &Bundle<'_>,
+    items: &[T],
+    of: impl Fn(&mut Screen<'_, '_>, &T) -> R + Sync,
+) -> Result<Vec<R>, VerifyError> {
+    let run = |items: &[T]| with_screen(bundle, |mut screen| items.iter().map(|item| of(&mut screen, item)).collect::<Vec<R>>());
+    Ok(items.par_chunks(FAR_RUN).map(run).collect::<Result<Vec<_>, _>>()?.into_iter().flatten().collect())
 }
 
 /// Plays the frames `frames` of a finished bundle; `show` gets each one's number and its R, G, B bytes, row by row.
@@ -389,25 +401,22 @@ pub fn against_truth(
     let width = bundle.size().0 as usize;
     let done = AtomicU32::new(0);
     // PSNR as frames are, PSNR as others draw them, and SSIM.
-    let compared = |&frame: &u32| -> Result<(f64, [f64; 4], f64), VerifyError> {
+    let compared = |screen: &mut Screen<'_, '_>, frame: u32| -> (f64, [f64; 4], f64) {
         let known = rendered.iter().find(|&&(at, _)| at == frame);
         let exact = known.map_or_else(|| Cow::from(truth.frame(frame)), |(_, picture)| Cow::from(picture));
-        let found = with_screen(&bundle, |mut screen| {
-            let mut played = Vec::new();
-            let psnr = |played: &[u8]| metrics::psnr(metrics::mean_squared_error(played, &exact));
-            screen.play(frame, &mut played);
-            let (plain, ssim) = (psnr(&played), metrics::ssim(&played, &exact, width));
-            let ways: [Row<'_>; 4] = [Player::smooth_row, Player::dithered_row, Player::bilinear_row, Player::fine_row];
-            let others = ways.map(|row| {
-                screen.draw(&mut played, row);
-                psnr(&played)
-            });
-            (plain, others, ssim)
-        })?;
+        let mut played = Vec::new();
+        let psnr = |played: &[u8]| metrics::psnr(metrics::mean_squared_error(played, &exact));
+        screen.play(frame, &mut played);
+        let (plain, ssim) = (psnr(&played), metrics::ssim(&played, &exact, width));
+        let ways: [Row<'_>; 4] = [Player::smooth_row, Player::dithered_row, Player::bilinear_row, Player::fine_row];
+        let others = ways.map(|row| {
+            screen.draw(&mut played, row);
+            psnr(&played)
+        });
         progress(done.fetch_add(1, Ordering::Relaxed) + 1, frames.len() as u32);
-        Ok(found)
+        (plain, others, ssim)
     };
-    let all: Vec<_> = frames.par_iter().map(compared).collect::<Result<_, _>>()?;
+    let all = in_runs(&bundle, frames, |screen, &frame| compared(screen, frame))?;
     let count = all.len().max(1) as f64;
     let (mut psnr_mean, mut others, mut ssim_mean) = (0.0, [0.0; 4], 0.0);
     for (plain, ways, ssim) in all {
@@ -426,14 +435,11 @@ pub fn against_truth(
 /// [`VerifyError`] where the player refuses the bytes.
 pub(crate) fn against_pictures(bytes: &[u8], pictures: &[(u32, Vec<u8>)]) -> Result<f64, VerifyError> {
     let bundle = Bundle::parse(bytes)?;
-    let compared = |(frame, exact): &(u32, Vec<u8>)| {
-        with_screen(&bundle, |mut screen| {
-            let mut played = Vec::new();
-            screen.play(*frame, &mut played);
-            metrics::psnr(metrics::mean_squared_error(&played, exact))
-        })
-    };
-    let all: Vec<f64> = pictures.par_iter().map(compared).collect::<Result<_, _>>()?;
+    let all = in_runs(&bundle, pictures, |screen, (frame, exact)| {
+        let mut played = Vec::new();
+        screen.play(*frame, &mut played);
+        metrics::psnr(metrics::mean_squared_error(&played, exact))
+    })?;
     Ok(all.iter().sum::<f64>() / all.len().max(1) as f64)
 }
 
