@@ -5,6 +5,7 @@ use super::builder::GUTTER;
 use super::sky::ELEVATION;
 use super::{NAMES, build};
 use crate::scene::{Scene, Triangle};
+use crate::trace::Tracer;
 use glam::{DVec2, DVec3};
 use std::collections::BTreeMap;
 
@@ -28,30 +29,6 @@ fn by_island(scene: &Scene) -> BTreeMap<u16, Vec<&Triangle>> {
 
 fn bounds(scene: &Scene, triangles: &[&Triangle]) -> (DVec2, DVec2) {
     triangles.iter().flat_map(|t| texels(scene, t)).fold((DVec2::INFINITY, DVec2::NEG_INFINITY), |(low, high), p| (low.min(p), high.max(p)))
-}
-
-/// The nearest hit along a ray: distance, triangle.
-fn cast(scene: &Scene, eye: DVec3, direction: DVec3) -> Option<(f64, usize)> {
-    let mut best: Option<(f64, usize)> = None;
-    for (index, triangle) in scene.triangles.iter().enumerate() {
-        let [a, b, c] = triangle.position;
-        let (ab, ac) = (b - a, c - a);
-        let p = direction.cross(ac);
-        let det = ab.dot(p);
-        let from_a = eye - a;
-        let u = from_a.dot(p) / det;
-        // A hair of slack: a ray along a shared edge must not fall between its triangles.
-        if !(-1e-9..=1.0 + 1e-9).contains(&u) {
-            continue;
-        }
-        let q = from_a.cross(ab);
-        let v = direction.dot(q) / det;
-        let t = ac.dot(q) / det;
-        if v >= -1e-9 && u + v <= 1.0 + 1e-9 && t > 1e-9 && best.is_none_or(|(nearest, _)| t < nearest) {
-            best = Some((t, index));
-        }
-    }
-    best
 }
 
 #[test]
@@ -135,8 +112,8 @@ fn islands_are_injective() {
 #[test]
 fn every_ray_of_the_path_meets_the_front_of_a_surface() {
     for scene in scenes() {
-        // The terrain is large; a fold in it would show in any frame.
-        let steps = if scene.triangles.len() > 100_000 { (24, 16) } else { (80, 120) };
+        let tracer = Tracer::new(&scene);
+        let steps = (80, 120);
         let mut missed = Vec::new();
         let mut behind = Vec::new();
         for frame in [0, 21, 43, 64, 85, 106, 127] {
@@ -150,13 +127,12 @@ fn every_ray_of_the_path_meets_the_front_of_a_surface() {
                     }
                     let (x, y) = (f64::from(i) / f64::from(steps.0) * 320.0, f64::from(j) / f64::from(steps.1) * 240.0);
                     let direction = pose.direction(320, 240, x, y);
-                    let Some((_, hit)) = cast(&scene, pose.eye, direction) else {
+                    let Some(hit) = tracer.hit(pose.eye, direction) else {
                         missed.push((frame, x, y, libm::atan2(direction.x, -direction.z), libm::asin(direction.y)));
                         continue;
                     };
-                    let [a, b, c] = scene.triangles[hit].position;
-                    if (b - a).cross(c - a).dot(direction) > 0.0 {
-                        behind.push((frame, x, y, scene.triangles[hit].island));
+                    if hit.back {
+                        behind.push((frame, x, y, scene.triangles[hit.triangle as usize].island));
                     }
                 }
             }
