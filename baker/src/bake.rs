@@ -300,17 +300,19 @@ pub fn settled(scene: &Scene, flat: &Flat, fitted: &Fitted, settings: &Settings,
     let header = encode::Header { storage: settings.atlas.storage, fps: scene.playback.fps, info: &info };
     let (planes, cameras) = planes::records(charts, &layers.by_label(image.labels.len()), lenses, grid);
     let content = Content { grid, image, sheets: &sheets, layers, fit, fields: &fields, planes: &planes, cameras: &cameras };
-    let code = |coding: CodingSettings| -> Result<Vec<u8>, BakeError> { Ok(encode::bundle(&content, coding, header)?) };
+    let own = settings.atlas.storage;
+    let code = |coding: CodingSettings, storage: Storage| -> Result<Vec<u8>, BakeError> {
+        Ok(encode::bundle(&content, coding, encode::Header { storage, ..header })?)
+    };
     let bundle = match settings.sparing {
-        Sparing::Nothing => code(settings.coding)?,
+        Sparing::Nothing => code(settings.coding, own)?,
         Sparing::Unseen => {
-            // To pack the same picture for each, and to unpack it for each player, would take longer than all else.
-            let raw = encode::Header { storage: Storage::Raw, ..header };
-            let try_raw = |coding: CodingSettings| -> Result<Vec<u8>, BakeError> { Ok(encode::bundle(&content, coding, raw)?) };
-            let (bundle, coding) = spare::unseen(&flat.atlas, encode::image_bytes(image, Storage::Raw), settings.coding, try_raw)?;
-            if header.storage == Storage::Raw { bundle } else { code(coding)? }
+            // To pack the same picture for each that is tried, and unpack it for each player, took two thirds of a small scene's time.
+            let raw = encode::image_bytes(image, Storage::Raw);
+            let (bundle, coding) = spare::unseen(&flat.atlas, raw, settings.coding, |coding| code(coding, Storage::Raw))?;
+            if own == Storage::Raw { bundle } else { code(coding, own)? }
         }
-        Sparing::Within(bytes) => spare::within(bytes, |lambda| code(settings.coding.worth(lambda)))?,
+        Sparing::Within(bytes) => spare::within(bytes, |lambda| code(settings.coding.worth(lambda), own))?,
     };
     progress("coding keys", 1.0);
     let seconds = fitted.seconds + start.elapsed().as_secs_f64();
