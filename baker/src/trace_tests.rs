@@ -65,16 +65,11 @@ fn terrain(centre: DVec3, size: f64) -> Vec<Triangle> {
     quads(&(0..=100).map(|i| (0..=100).map(|j| point(i, j)).collect()).collect::<Vec<_>>())
 }
 
-/// What a ray hits, alone and among others.
-fn both(tracer: &Tracer<'_>, origin: DVec3, direction: DVec3) -> [Option<Hit>; 2] {
+/// What a ray hits, which has to be the same alone and among others.
+fn hit(tracer: &Tracer<'_>, origin: DVec3, direction: DVec3) -> Option<Hit> {
     let directions = std::array::from_fn(|at| direction.lerp(DVec3::new(0.1, -0.9, 0.3), 0.01 * (at as f64 - 3.0)));
     assert_eq!(directions[3], direction);
-    [tracer.hit(origin, direction), tracer.hits(origin, &directions)[3]]
-}
-
-/// The same, which has to be one.
-fn hit(tracer: &Tracer<'_>, origin: DVec3, direction: DVec3) -> Option<Hit> {
-    let [alone, among] = both(tracer, origin, direction);
+    let (alone, among) = (tracer.hit(origin, direction), tracer.hits(origin, &directions)[3]);
     assert_eq!(alone, among, "{origin} {direction}");
     alone
 }
