@@ -98,7 +98,7 @@ fn gain<E>(keys: Ordering, exact: f64, time: f64, visible: impl FnOnce() -> Resu
 }
 
 /// `usual`, or a bundle of other cells or intervals if that is worth more, as sparing counts it; and then why. Closer keys may be worth it by what is `seen`
-/// of them instead, and farther ones have to be by both. `all`: quality before sheets were left out.
+/// of them instead, and farther ones have to be by both. `all`: quality before sheets were left out; `space`: what a bundle of other cells is made with.
 ///
 /// # Errors
 /// Those of encoding, and of the player.
@@ -107,6 +107,7 @@ pub(crate) fn choose(
     flat: &Flat,
     usual: Made,
     all: &Brief,
+    space: &dyn Fn(u32) -> u8,
     seen: &Seen<'_>,
     progress: Progress<'_>,
 ) -> Result<(Made, Option<Other>), BakeError> {
@@ -144,7 +145,7 @@ pub(crate) fn choose(
             }
             progress("trying other cells", f64::from(tried) / most as f64);
             tried += 1;
-            let made = Made::new(scene, flat, *settings)?;
+            let made = Made::new(scene, flat, Settings { space: space(settings.cell), ..*settings })?;
             let gained = gained(&made)?;
             if gained > better.as_ref().map_or(0.0, |&(most, _)| most) {
                 better = Some((gained, made));
@@ -179,7 +180,8 @@ mod tests {
     fn chosen(scene: &Scene, flat: &Flat, usual: Made) -> (Made, Option<Other>) {
         let all = usual.quality;
         let tracer = Tracer::new(scene);
-        choose(scene, flat, usual, &all, &Seen::new(&tracer, None), &|_, _| {}).unwrap()
+        let space = usual.settings.space;
+        choose(scene, flat, usual, &all, &|_| space, &Seen::new(&tracer, None), &|_, _| {}).unwrap()
     }
 
     #[test]

@@ -13,6 +13,7 @@ use crate::made::Made;
 use crate::outlines;
 use crate::repaint::Painter;
 use crate::report::{Origin, Report, Seconds};
+use crate::rough;
 use crate::scene::Scene;
 use crate::seen::Seen;
 use crate::straight;
@@ -232,15 +233,18 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
     let paint_start = Instant::now();
     let painter = (!options.plain).then(|| Painter::new(&cast, progress));
     let paint_seconds = paint_start.elapsed().as_secs_f64();
-    let (chosen, fitted) = match options.goal {
+    let space = |cell: u32, rough: bool| options.space.unwrap_or(straight::first(cell, rough));
+    let (chosen, fitted, rough) = match options.goal {
         Goal::AsSet => {
             let flat = bake::flatten_cast(&cast, &settings.atlas, progress)?;
             something_seen(&flat)?;
+            let rough = options.space.is_none() && rough::rough(&flat.atlas.gbuffer, settings.cell);
+            let settings = Settings { space: space(settings.cell, rough), ..settings };
             let fitted = bake::fitted(scene, &flat, &settings, progress)?;
             let encoded = bake::settled(scene, &flat, &fitted, &settings, progress)?;
-            (Chosen { flat, encoded, settings, search_seconds: 0.0, warnings: Vec::new() }, Some(fitted))
+            (Chosen { flat, encoded, settings, search_seconds: 0.0, warnings: Vec::new() }, Some(fitted), rough)
         }
-        goal => (tune::search((&cast, painter.as_ref()), options, goal, whole, progress)?, None),
+        goal => (tune::search((&cast, painter.as_ref()), options, goal, whole, progress)?, None, false),
     };
     let Chosen { mut flat, encoded, settings, search_seconds, warnings } = chosen;
     // Large, and of no more use.
@@ -259,7 +263,8 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
     let prunes = !options.all_sheets && options.goal == Goal::AsSet;
     let made = if prunes { fewer::choose(scene, &flat, made, progress)? } else { made };
     let seen = Seen::new(tracer, painter.as_ref());
-    let (made, other) = if free { finer::choose(scene, &flat, made, &all, &seen, progress)? } else { (made, None) };
+    let (made, other) =
+        if free { finer::choose(scene, &flat, made, &all, &|cell| space(cell, rough), &seen, progress)? } else { (made, None) };
     let bends = options.goal == Goal::AsSet && options.space.is_none();
     let (made, spaces) = if bends { straight::choose(scene, &flat, made, progress)? } else { (made, Vec::new()) };
     // In other cells what a sheet has to save is another thing.
@@ -296,7 +301,7 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
         verify: verify_start.elapsed().as_secs_f64(),
         search: choice_seconds + search_seconds,
     };
-    let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings, spaces, outlines, repainted };
+    let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings, spaces, rough, outlines, repainted };
     let mut report = Report::new(&origin, &inspection, quality, truth, work, seconds);
     report.warnings.extend(warnings.into_iter().chain(finer));
     Ok(Baked { bundle: encoded.bundle, report, flat, settings })

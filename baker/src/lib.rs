@@ -36,6 +36,7 @@ mod prune;
 pub mod ram;
 pub mod repaint;
 pub mod report;
+mod rough;
 mod samples;
 pub mod scene;
 mod seen;

@@ -10,7 +10,7 @@ use crate::outlines;
 use crate::scene::Scene;
 use crate::straight;
 use crate::verify::{Quality, TruthQuality, Work};
-use cubist_core::format::{ATLAS, LABELS, MASK, TexelKind};
+use cubist_core::format::{ATLAS, LABELS, MASK, SPACE_LINEAR, TexelKind};
 use serde::{Deserialize, Serialize};
 
 /// Below this share of the resolution asked for, the source image is called too small.
@@ -58,6 +58,9 @@ pub struct Grid {
     /// The kinds of space that were tried, and what came of them; empty where none was.
     #[serde(default)]
     pub spaces: Vec<straight::Trial>,
+    /// Surfaces are so rough that curves would follow them no better: straight space was taken at once.
+    #[serde(default)]
+    pub rough: bool,
 }
 
 /// Bytes by section; `bundle` is the sum of `atlas`, `labels`, `mask`, `keys` and `other`.
@@ -199,6 +202,8 @@ pub(crate) struct Origin<'a> {
     pub settings: &'a Settings,
     /// Kinds of space that were tried.
     pub spaces: Vec<straight::Trial>,
+    /// Surfaces are rough.
+    pub rough: bool,
     /// Outlines that were tried.
     pub outlines: Vec<outlines::Trial>,
     /// Texels were coloured by the pixels that show them.
@@ -237,6 +242,7 @@ impl Report {
                 time: time_name(settings.time).to_owned(),
                 space: space_name(settings.space).to_owned(),
                 spaces: origin.spaces.clone(),
+                rough: origin.rough && settings.space == SPACE_LINEAR,
             },
             source_image: Source {
                 width: image.width,
@@ -381,6 +387,9 @@ pub fn table(report: &Report) -> Vec<(String, String)> {
     row("grid", format!("{keys} keys, one every {every} frames; cells of {cell} pixels; time {time}, space {space}"));
     if !grid.spaces.is_empty() {
         row("", straight::reason(&grid.spaces));
+    }
+    if grid.rough {
+        row("", "surfaces are rough: curves between nodes would follow them no better, and were not tried".to_owned());
     }
     row(
         "source image",

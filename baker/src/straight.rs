@@ -1,6 +1,6 @@
 //! Straight space: a bundle whose surfaces bend between the corners of cells comes from `job`; one where they run straight goes back if that is
 //! worth as much. It plays in a twentieth to a sixth fewer instructions and a tenth to a fifth less memory. Large flat surfaces seen at a slant
-//! want the curve, most meshes show no difference.
+//! want the curve, most meshes show no difference. What is `rough` is made straight at once, and nothing is tried.
 
 use crate::bake::{BakeError, Flat, Progress, Settings};
 use crate::inspect::{Inspection, space_name};
@@ -8,13 +8,18 @@ use crate::made::Made;
 use crate::report::grouped;
 use crate::scene::Scene;
 use crate::verify;
-use cubist_core::format::SPACE_LINEAR;
+use cubist_core::format::{SPACE_CUBIC, SPACE_LINEAR};
 use serde::{Deserialize, Serialize};
 
 /// Side of the largest cells that go straight, pixels: in larger ones surfaces bend too much.
 const MOST: u32 = 8;
 /// What curves have to gain to be used, dB: bytes of keys count as sparing counts them.
 const GAIN: f64 = 0.1;
+
+/// The space of what is first made in cells of `cell` pixels.
+pub(crate) fn first(cell: u32, rough: bool) -> u8 {
+    if rough && cell <= MOST { SPACE_LINEAR } else { SPACE_CUBIC }
+}
 
 /// One kind of space, tried.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -37,15 +42,16 @@ impl Trial {
     }
 }
 
-/// `curved`, or what is made of the scene with straight space if that is worth as much; and both as they were tried, the straight one last. In large
-/// cells nothing is tried.
+/// `usual`, or what is made of the scene with straight space if that is worth as much; and both as they were tried, the straight one last. In large
+/// cells nothing is tried, nor where it is straight already.
 ///
 /// # Errors
 /// Those of encoding, and of the player.
-pub(crate) fn choose(scene: &Scene, flat: &Flat, curved: Made, progress: Progress<'_>) -> Result<(Made, Vec<Trial>), BakeError> {
-    if curved.settings.cell > MOST {
-        return Ok((curved, Vec::new()));
+pub(crate) fn choose(scene: &Scene, flat: &Flat, usual: Made, progress: Progress<'_>) -> Result<(Made, Vec<Trial>), BakeError> {
+    if usual.settings.cell > MOST || usual.settings.space == SPACE_LINEAR {
+        return Ok((usual, Vec::new()));
     }
+    let curved = usual;
     progress("trying straight space", 0.0);
     let straight = Made::new(scene, flat, Settings { space: SPACE_LINEAR, ..curved.settings })?;
     progress("trying straight space", 1.0);
@@ -68,7 +74,6 @@ mod tests {
     use super::*;
     use crate::bake;
     use crate::scene::builtin;
-    use cubist_core::format::SPACE_CUBIC;
 
     fn chosen(name: &str, size: [u32; 2], frames: u32, cell: u32) -> (u8, Vec<Trial>) {
         let mut scene = builtin::build(name).unwrap();
