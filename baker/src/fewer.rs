@@ -10,6 +10,7 @@ use crate::scene::Scene;
 /// # Errors
 /// Those of encoding, and of the player.
 pub(crate) fn anew(scene: &Scene, flat: &Flat, made: Made, progress: Progress<'_>) -> Result<Made, BakeError> {
+    progress("pruning sheets", 0.0);
     let all = Made::new(scene, flat, Settings { error: 0.0, ..made.settings })?;
     let picture = made.picture(flat);
     let other = choose(scene, flat, all, progress)?;

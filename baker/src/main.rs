@@ -19,7 +19,7 @@ use serde_json::json;
 use std::io::IsTerminal;
 use std::path::Path;
 use std::process::ExitCode;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
@@ -159,7 +159,10 @@ fn bar(quiet: bool) -> ProgressBar {
         return ProgressBar::hidden();
     }
     let style = ProgressStyle::with_template("{msg:26} [{wide_bar}] {elapsed}").unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(1000).with_style(style)
+    let bar = ProgressBar::new(1000).with_style(style);
+    // Of two changes close behind each other only the first is drawn: a stage that says nothing for long would go by the name of the one before it.
+    bar.enable_steady_tick(Duration::from_millis(100));
+    bar
 }
 
 /// Rows of name and value, the values in one column.
