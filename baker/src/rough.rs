@@ -75,8 +75,8 @@ fn errors(cell: usize, at: impl Fn(usize, usize) -> [f32; 2]) -> Option<[f64; 2]
             let [a, b] = [across, down].map(|pixels| pixels as f32 / cell as f32);
             let exact = at(cell + across, cell + down);
             let off = |way: fn([f32; 4], f32) -> f32| {
-                let axis = |k: usize| exact[k] - way(nodes.map(|row| way(row.map(|node| node[k]), a)), b);
-                axis(0).powi(2) + axis(1).powi(2)
+                let [u, v] = [0, 1].map(|k| exact[k] - way(nodes.map(|row| way(row.map(|node| node[k]), a)), b));
+                u * u + v * v
             };
             let [straight, curved] = [off(line), off(curve)];
             if straight > FAR * FAR {
