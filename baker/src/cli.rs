@@ -96,8 +96,8 @@ pub struct Bake {
     ///
     /// Cubic bends every cell evenly across and down, by as much as the corners around it say: large flat surfaces seen at a slant want that. Linear
     /// takes less memory, and draws in a twentieth to a sixth fewer instructions; on most models of many small faces nothing
-    /// shows the difference. Without this both are made in cells of 4 and 8 pixels, and the report has the figures of both; what is too rough for
-    /// curves is made linear at once. Searches (--budget, --psnr) take cubic; --ram tries what fits.
+    /// shows the difference. Without this both are made in cells of 4 and 8 pixels, and the report has the figures of both, unless surfaces are so
+    /// rough, or bend so smoothly, that one is sure. Searches (--budget, --psnr) take cubic; --ram tries what fits.
     #[arg(long, value_enum, value_name = "KIND")]
     pub space: Option<Space>,
     /// Largest side of the source image, texels, 64 to 1024.

@@ -3,6 +3,7 @@
 
 use crate::atlas::{self, Storage};
 use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings, Sparing};
+use crate::bends::Bends;
 use crate::cast::Cast;
 use crate::chart::{self, Choice, Family};
 use crate::choose;
@@ -13,7 +14,6 @@ use crate::made::Made;
 use crate::outlines;
 use crate::repaint::Painter;
 use crate::report::{Origin, Report, Seconds};
-use crate::rough;
 use crate::scene::Scene;
 use crate::seen::Seen;
 use crate::straight;
@@ -233,18 +233,18 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
     let paint_start = Instant::now();
     let painter = (!options.plain).then(|| Painter::new(&cast, progress));
     let paint_seconds = paint_start.elapsed().as_secs_f64();
-    let space = |cell: u32, rough: bool| options.space.unwrap_or(straight::first(cell, rough));
-    let (chosen, fitted, rough) = match options.goal {
+    let space = |cell: u32, bends: Option<Bends>| options.space.unwrap_or(straight::first(cell, bends));
+    let (chosen, fitted, bends) = match options.goal {
         Goal::AsSet => {
             let flat = bake::flatten_cast(&cast, &settings.atlas, progress)?;
             something_seen(&flat)?;
-            let rough = options.space.is_none() && rough::rough(&flat.atlas.gbuffer, settings.cell);
-            let settings = Settings { space: space(settings.cell, rough), ..settings };
+            let bends = if options.space.is_none() { straight::told(&flat.atlas.gbuffer, settings.cell) } else { None };
+            let settings = Settings { space: space(settings.cell, bends), ..settings };
             let fitted = bake::fitted(scene, &flat, &settings, progress)?;
             let encoded = bake::settled(scene, &flat, &fitted, &settings, progress)?;
-            (Chosen { flat, encoded, settings, search_seconds: 0.0, warnings: Vec::new() }, Some(fitted), rough)
+            (Chosen { flat, encoded, settings, search_seconds: 0.0, warnings: Vec::new() }, Some(fitted), bends)
         }
-        goal => (tune::search((&cast, painter.as_ref()), options, goal, whole, progress)?, None, false),
+        goal => (tune::search((&cast, painter.as_ref()), options, goal, whole, progress)?, None, None),
     };
     let Chosen { mut flat, encoded, settings, search_seconds, warnings } = chosen;
     // Large, and of no more use.
@@ -264,9 +264,11 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
     let made = if prunes { fewer::choose(scene, &flat, made, progress)? } else { made };
     let seen = Seen::new(tracer, painter.as_ref());
     let (made, other) =
-        if free { finer::choose(scene, &flat, made, &all, &|cell| space(cell, rough), &seen, progress)? } else { (made, None) };
-    let bends = options.goal == Goal::AsSet && options.space.is_none();
-    let (made, spaces) = if bends { straight::choose(scene, &flat, made, progress)? } else { (made, Vec::new()) };
+        if free { finer::choose(scene, &flat, made, &all, &|cell| space(cell, bends), &seen, progress)? } else { (made, None) };
+    // In smaller cells they bend less.
+    let smooth = bends == Some(Bends::Smooth) && made.settings.cell >= settings.cell;
+    let tries = options.goal == Goal::AsSet && options.space.is_none() && !smooth;
+    let (made, spaces) = if tries { straight::choose(scene, &flat, made, progress)? } else { (made, Vec::new()) };
     // In other cells what a sheet has to save is another thing.
     let mut made = if prunes && other.is_some() { fewer::anew(scene, &flat, made, progress)? } else { made };
     let finer = other.map(|other| other.said(&made));
@@ -301,7 +303,7 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
         verify: verify_start.elapsed().as_secs_f64(),
         search: choice_seconds + search_seconds,
     };
-    let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings, spaces, rough, outlines, repainted };
+    let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings, spaces, bends, outlines, repainted };
     let mut report = Report::new(&origin, &inspection, quality, truth, work, seconds);
     report.warnings.extend(warnings.into_iter().chain(finer));
     Ok(Baked { bundle: encoded.bundle, report, flat, settings })

@@ -6,6 +6,7 @@
 mod around;
 pub mod atlas;
 pub mod bake;
+pub mod bends;
 pub mod camera;
 pub mod cast;
 pub mod causes;
@@ -36,7 +37,6 @@ mod prune;
 pub mod ram;
 pub mod repaint;
 pub mod report;
-mod rough;
 mod samples;
 pub mod scene;
 mod seen;

@@ -3,6 +3,7 @@
 
 use crate::atlas::Storage;
 use crate::bake::{Encoded, Flat, Settings};
+use crate::bends::{self, Bends};
 use crate::causes::Causes;
 use crate::chart::{self, Family, Trial};
 use crate::inspect::{Inspection, space_name, time_name};
@@ -58,9 +59,9 @@ pub struct Grid {
     /// The kinds of space that were tried, and what came of them; empty where none was.
     #[serde(default)]
     pub spaces: Vec<straight::Trial>,
-    /// Surfaces are so rough that curves would follow them no better: straight space was taken at once.
+    /// How surfaces bend, where that alone told the space.
     #[serde(default)]
-    pub rough: bool,
+    pub bends: Option<Bends>,
 }
 
 /// Bytes by section; `bundle` is the sum of `atlas`, `labels`, `mask`, `keys` and `other`.
@@ -202,8 +203,8 @@ pub(crate) struct Origin<'a> {
     pub settings: &'a Settings,
     /// Kinds of space that were tried.
     pub spaces: Vec<straight::Trial>,
-    /// Surfaces are rough.
-    pub rough: bool,
+    /// How surfaces bend, where that tells anything.
+    pub bends: Option<Bends>,
     /// Outlines that were tried.
     pub outlines: Vec<outlines::Trial>,
     /// Texels were coloured by the pixels that show them.
@@ -242,7 +243,9 @@ impl Report {
                 time: time_name(settings.time).to_owned(),
                 space: space_name(settings.space).to_owned(),
                 spaces: origin.spaces.clone(),
-                rough: origin.rough && settings.space == SPACE_LINEAR,
+                bends: origin
+                    .bends
+                    .filter(|&bends| origin.spaces.is_empty() && (bends == Bends::Rough) == (settings.space == SPACE_LINEAR)),
             },
             source_image: Source {
                 width: image.width,
@@ -388,8 +391,8 @@ pub fn table(report: &Report) -> Vec<(String, String)> {
     if !grid.spaces.is_empty() {
         row("", straight::reason(&grid.spaces));
     }
-    if grid.rough {
-        row("", "surfaces are rough: curves between nodes would follow them no better, and were not tried".to_owned());
+    if let Some(bends) = grid.bends {
+        row("", bends::reason(bends).to_owned());
     }
     row(
         "source image",

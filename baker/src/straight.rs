@@ -1,8 +1,10 @@
 //! Straight space: a bundle whose surfaces bend between the corners of cells comes from `job`; one where they run straight goes back if that is
 //! worth as much. It plays in a twentieth to a sixth fewer instructions and a tenth to a fifth less memory. Large flat surfaces seen at a slant
-//! want the curve, most meshes show no difference. What is `rough` is made straight at once, and nothing is tried.
+//! want the curve, most meshes show no difference. Where surfaces bend so that either is sure (see [`bends`]), nothing is tried.
 
 use crate::bake::{BakeError, Flat, Progress, Settings};
+use crate::bends::{self, Bends};
+use crate::gbuffer::GBuffer;
 use crate::inspect::{Inspection, space_name};
 use crate::made::Made;
 use crate::report::grouped;
@@ -16,9 +18,14 @@ const MOST: u32 = 8;
 /// What curves have to gain to be used, dB: bytes of keys count as sparing counts them.
 const GAIN: f64 = 0.1;
 
+/// How surfaces bend, where that tells which space suits them in cells of `cell` pixels.
+pub(crate) fn told(gbuffer: &GBuffer, cell: u32) -> Option<Bends> {
+    if cell <= MOST { bends::of(gbuffer, cell) } else { None }
+}
+
 /// The space of what is first made in cells of `cell` pixels.
-pub(crate) fn first(cell: u32, rough: bool) -> u8 {
-    if rough && cell <= MOST { SPACE_LINEAR } else { SPACE_CUBIC }
+pub(crate) fn first(cell: u32, bends: Option<Bends>) -> u8 {
+    if bends == Some(Bends::Rough) && cell <= MOST { SPACE_LINEAR } else { SPACE_CUBIC }
 }
 
 /// One kind of space, tried.
