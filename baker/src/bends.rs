@@ -2,14 +2,16 @@
 //! them, straight space shows as much; where curves do and straight lines are far off, it does not; in between both are tried. The G-buffer comes in from
 //! `job`.
 
+use crate::camera::segment;
 use crate::gbuffer::GBuffer;
+use glam::DVec2;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 /// Frames looked at: every so many.
 const EVERY: usize = 4;
 /// A place that is farther than this from where a straight line has it is on another part of the surface, texels.
-const FAR: f32 = 16.0;
+const FAR: f64 = 16.0;
 /// Surfaces are rough where curves leave at least this share of the squared error of straight lines. On land and among leaves they leave .97 to 1.2, in rooms
 /// and on most models .0 to .8. Between these a scene gains up to .3 dB from curves, or nothing.
 const ROUGH: f64 = 0.97;
@@ -82,7 +84,8 @@ fn frame_errors(gbuffer: &GBuffer, cell: usize, frame: usize) -> Errors {
             let label = gbuffer.label[at(0, 0)];
             let row = |down: usize| &gbuffer.label[at(0, down)..=at(3 * cell, down)];
             let whole = label != 0 && (0..=3 * cell).all(|down| row(down).iter().all(|&other| other == label));
-            let found = if whole { cell_errors(cell, |across, down| gbuffer.uv[at(across, down)]) } else { None };
+            let found =
+                if whole { cell_errors(cell, |across, down| DVec2::from(gbuffer.uv[at(across, down)].map(f64::from))) } else { None };
             all = all.add(Errors { cells: 1, ..found.unwrap_or_default() });
         }
     }
@@ -90,31 +93,28 @@ fn frame_errors(gbuffer: &GBuffer, cell: usize, frame: usize) -> Errors {
 }
 
 /// Those of one cell of positions that `at` tells, from the corner of the cell before it on; `None` where some are far off.
-fn cell_errors(cell: usize, at: impl Fn(usize, usize) -> [f32; 2]) -> Option<Errors> {
-    let nodes: [[[f32; 2]; 4]; 4] = std::array::from_fn(|j| std::array::from_fn(|i| at(i * cell, j * cell)));
-    let turned: [[[f32; 2]; 4]; 4] = std::array::from_fn(|i| std::array::from_fn(|j| nodes[j][i]));
+fn cell_errors(cell: usize, at: impl Fn(usize, usize) -> DVec2) -> Option<Errors> {
+    let nodes: [[DVec2; 4]; 4] = std::array::from_fn(|j| std::array::from_fn(|i| at(i * cell, j * cell)));
+    let turned: [[DVec2; 4]; 4] = std::array::from_fn(|i| std::array::from_fn(|j| nodes[j][i]));
     if nodes.iter().chain(&turned).flat_map(|line| line.windows(3)).any(jump) {
         return None;
     }
     let (mut squared, mut off) = ([0.0; 2], 0.0);
     for down in 0..cell {
         for across in 0..cell {
-            let [a, b] = [across, down].map(|pixels| pixels as f32 / cell as f32);
+            let [a, b] = [across, down].map(|pixels| pixels as f64 / cell as f64);
             let exact = at(cell + across, cell + down);
-            let error = |way: fn([f32; 4], f32) -> f32| {
-                let [u, v] = [0, 1].map(|k| exact[k] - way(nodes.map(|row| way(row.map(|node| node[k]), a)), b));
-                u * u + v * v
-            };
-            let [straight, curved] = [error(line), error(curve)];
+            let error = |way: fn([DVec2; 4], f64) -> DVec2| exact.distance_squared(way(nodes.map(|row| way(row, a)), b));
+            let [straight, curved] = [error(line), error(segment)];
             if straight > FAR * FAR {
                 return None;
             }
-            squared = [squared[0] + f64::from(straight), squared[1] + f64::from(curved)];
-            off += f64::from(straight.sqrt().min(1.0));
+            squared = [squared[0] + straight, squared[1] + curved];
+            off += straight.sqrt().min(1.0);
         }
     }
     let pixels = (cell * cell) as f64;
-    Some(Errors { squared: squared.map(|sum| sum / pixels), off: off / pixels, whole: 1, cells: 1 })
+    Some(Errors { squared: squared.map(|sum| sum / pixels), off: off / pixels, whole: 1, ..Errors::default() })
 }
 
 /// Why one kind of space was not tried, in a line.
@@ -127,18 +127,13 @@ pub fn reason(bends: Bends) -> &'static str {
 }
 
 /// Whether one of three nodes in a line is on another part of the surface.
-fn jump(three: &[[f32; 2]]) -> bool {
-    (0..2).any(|k| (three[0][k] - 2.0 * three[1][k] + three[2][k]).abs() > FAR)
+fn jump(three: &[DVec2]) -> bool {
+    (three[0] - 2.0 * three[1] + three[2]).abs().max_element() > FAR
 }
 
 /// Straight between the two in the middle.
-fn line([_, b, c, _]: [f32; 4], t: f32) -> f32 {
-    b + t * (c - b)
-}
-
-/// On the curve through all four (E. Catmull and R. Rom, "A class of local interpolating splines", 1974).
-fn curve([a, b, c, d]: [f32; 4], t: f32) -> f32 {
-    b + 0.5 * t * (c - a + t * (2.0 * a - 5.0 * b + 4.0 * c - d + t * (3.0 * (b - c) + d - a)))
+fn line([_, b, c, _]: [DVec2; 4], t: f64) -> DVec2 {
+    b.lerp(c, t)
 }
 
 #[cfg(test)]

@@ -12,14 +12,14 @@ use clap::{CommandFactory, Parser};
 use cli::{Bake, Cli, Command, Inspect, Playback, Throughput};
 use cubist_baker::inspect::Inspection;
 use cubist_baker::scene::Scene;
-use cubist_baker::terminal::{print, tell};
+use cubist_baker::terminal::{self, print, tell};
 use cubist_baker::{files, job, report, scene, trace};
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use serde_json::json;
 use std::io::IsTerminal;
 use std::path::Path;
 use std::process::ExitCode;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
@@ -158,11 +158,7 @@ fn bar(quiet: bool) -> ProgressBar {
     if quiet || !std::io::stderr().is_terminal() {
         return ProgressBar::hidden();
     }
-    let style = ProgressStyle::with_template("{msg:26} [{wide_bar}] {elapsed}").unwrap_or_else(|_| ProgressStyle::default_bar());
-    let bar = ProgressBar::new(1000).with_style(style);
-    // Of two changes close behind each other only the first is drawn: a stage that says nothing for long would go by the name of the one before it.
-    bar.enable_steady_tick(Duration::from_millis(100));
-    bar
+    terminal::bar(1000, "{msg:26} [{wide_bar}] {elapsed}")
 }
 
 /// Rows of name and value, the values in one column.

@@ -9,6 +9,7 @@ mod spline;
 pub use animated::{Animated, Channel, Interpolation, Link, Property};
 pub use line::{Aim, Line};
 pub use orbit::{Orbit, Pivot, bearing};
+pub(crate) use spline::segment;
 pub use spline::{Spline, catmull_rom};
 
 use glam::DVec3;

@@ -3,6 +3,7 @@
 
 use super::{Path, Pose};
 use glam::DVec3;
+use std::ops::{Add, Mul, Sub};
 
 /// The point at `s` in 0..=1 (clamped) of the uniform Catmull-Rom spline through `points`: point i of n lies at i / (n - 1).
 /// Beyond its ends the curve continues by reflection; where the first and the last point are the same it is closed
@@ -28,7 +29,16 @@ pub fn catmull_rom(points: &[DVec3], s: f64) -> DVec3 {
         None if closed => points[1],
         None => 2.0 * c - b,
     };
-    b + 0.5 * t * ((c - a) + t * ((2.0 * a - 5.0 * b + 4.0 * c - d) + t * (3.0 * (b - c) + d - a)))
+    segment([a, b, c, d], t)
+}
+
+/// The point at `t` in 0..=1 between the inner two of four points (E. Catmull and R. Rom, "A class of local interpolating splines", 1974).
+#[inline]
+pub(crate) fn segment<V>([a, b, c, d]: [V; 4], t: f64) -> V
+where
+    V: Copy + Add<Output = V> + Sub<Output = V> + Mul<f64, Output = V>,
+{
+    b + ((c - a) + ((a * 2.0 - b * 5.0 + c * 4.0 - d) + ((b - c) * 3.0 + d - a) * t) * t) * (0.5 * t)
 }
 
 /// Through points, looking at points.
