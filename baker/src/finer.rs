@@ -23,15 +23,20 @@ const STEADY: f64 = 1.0;
 const USUAL: u32 = 8;
 /// So many times as many wrong pixels as usual are too many for keys farther apart where outlines are few: they flicker, which no mean tells.
 const FLICKER: f64 = 1.25;
-/// Why keys farther apart are used where neither many outlines nor bends are, and why closer ones.
+/// Why keys farther apart are used where neither many outlines nor bends are, and why closer ones there and elsewhere.
 const STEADILY: &str = "surfaces go straight on from key to key";
 const TURNING: &str = "outlines turn on their way from key to key";
+const BENDING: &str = "surfaces bend on their way from key to key";
 /// What closer keys have to gain there, dB: they take time in every frame. As much may farther ones lose of what is seen.
 const TIME: f64 = 0.2;
-/// Frames between keys, at least, where nothing bends: keys closer than that take more of every frame's time than all else.
+/// Frames between keys, at least, where nothing bends and they do not stand closer as it is: keys closer than that take more of every frame's time than all
+/// else.
 const CLOSEST: u32 = 4;
 /// Steps tried where positions bend, at most: fast turns want keys much closer.
 const BENT_TRIES: usize = 4;
+/// Texels of the same from which on closer keys are tried whatever crosses cells: a path that turns as fast shows nothing right between its keys, and in
+/// every cell outlines of what passes by.
+const FAST: f64 = 5.0;
 
 /// Why a bundle is of other cells or intervals than usual, and what the usual one was.
 pub(crate) struct Other {
@@ -69,18 +74,21 @@ fn climbs(cell: u32, quality: &Brief) -> Option<(&'static [Climb], &'static str)
     const FAR: Climb = (&[Step::DOUBLE], 2);
     const CLOSER: Climb = (&[Step::COARSER, Step::HALF], BENT_TRIES);
     const CLOSE: Climb = (&[Step::HALF, Step::CLOSER], 2);
+    const FASTER: Climb = (&[Step::HALF], BENT_TRIES);
     let (torn, bent) = (quality.wrong_surface_percent >= TORN, quality.path_error_texels.p99);
     let climbs: &[Climb] = match torn {
         true if bent < STEADY || cell > USUAL => &[FINER, FARTHER],
         true if bent < BENT => &[FARTHER],
+        true if bent >= FAST => &[FASTER],
         false if bent >= BENT => &[CLOSER],
         false if bent < STEADY => &[FAR, CLOSE],
         false => &[CLOSE],
         true => return None,
     };
     let why = match torn {
+        true if bent >= FAST && cell <= USUAL => BENDING,
         true => "many outlines cross every cell",
-        false if bent >= BENT => "surfaces bend on their way from key to key",
+        false if bent >= BENT => BENDING,
         false => STEADILY,
     };
     Some((climbs, why))
@@ -133,14 +141,18 @@ pub(crate) fn choose(
             Ok(seen.worth(made, flat, picture)? - before)
         })
     };
+    // Where a path turns quickly, or is short, keys stand much closer already.
+    let (asked, spacing) = (usual.settings.key_interval, usual.encoded.grid.spacing());
+    let stand = Settings { key_interval: if 2 * spacing <= asked { spacing } else { asked }, ..usual.settings };
+    let closest = CLOSEST.min((stand.key_interval / 2).max(1));
     let free = Free { cell: true, interval: true, lambda: false, time: false, space: false, frames: scene.playback.frames };
     let mut better: Option<(f64, Made)> = None;
     let most: usize = climbs.iter().map(|(_, tries)| tries).sum();
     let mut tried = 0;
     for &(steps, tries) in climbs {
-        climb((usual.settings, 0.0), &free, steps, tries, |settings| {
+        climb((stand, 0.0), &free, steps, tries, |settings| {
             let closer = settings.key_interval < usual.settings.key_interval && all.path_error_texels.p99 < BENT;
-            if closer && settings.key_interval < CLOSEST {
+            if closer && settings.key_interval < closest {
                 return Ok(None);
             }
             progress("trying other cells", f64::from(tried) / most as f64);
@@ -240,6 +252,20 @@ mod tests {
     }
 
     #[test]
+    fn short_clips_get_a_key_a_frame_where_they_want_it() {
+        // A quarter of a circle in four frames: keys at both ends alone, whatever the interval.
+        let (mut scene, _, _) = made("cone-orbit", [96, 72], 9, Settings::default());
+        scene.playback.frames = 4;
+        let flat = bake::flatten(&scene, &Settings::default().atlas, &|_, _| {}).unwrap();
+        let usual = Made::new(&scene, &flat, Settings::default()).unwrap();
+        assert_eq!((usual.encoded.grid.keys.len(), usual.encoded.grid.spacing()), (2, 3));
+        let before = usual.quality.psnr_mean;
+        let (kept, other) = chosen(&scene, &flat, usual);
+        assert_eq!((kept.settings.key_interval, other.is_some()), (1, true));
+        assert!(kept.quality.psnr_mean > before + 2.0, "{before} {}", kept.told());
+    }
+
+    #[test]
     fn closer_keys_gain_by_either_measure_and_farther_ones_by_both() {
         let gain = |keys, exact, visible| gain(keys, exact, TIME, || Ok::<_, ()>(visible)).unwrap();
         assert_eq!([gain(Ordering::Less, 0.5, -9.0), gain(Ordering::Less, -0.5, 0.5)], [0.5 - TIME, 0.5 - TIME]);
@@ -274,5 +300,7 @@ mod tests {
             [Some((2, "many")), Some((1, "surfaces")), Some((1, "surfaces"))]
         );
         assert_eq!(tried(8, 1.9, 0.9), Some((2, "surfaces")));
+        // So fast that outlines are no matter.
+        assert_eq!([tried(8, 20.0, 4.9), tried(8, 20.0, 5.0)], [None, Some((1, "surfaces"))]);
     }
 }

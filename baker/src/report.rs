@@ -384,10 +384,15 @@ pub fn table(report: &Report) -> Vec<(String, String)> {
     let looping = if report.looping { ", looping" } else { "" };
     row("scene", format!("{}: {} triangles, {} rays", report.scene, grouped(report.triangles), grouped(report.rays as usize)));
     row("playback", format!("{} frames of {width} x {height}, {} frames/s{looping}", report.frames, report.fps));
-    // A path shorter than the interval has keys at its ends all the same.
-    let every = grid.key_interval.min(report.frames.saturating_sub(1).max(1));
     let Grid { keys, cell, time, space, .. } = grid;
-    row("grid", format!("{keys} keys, one every {every} frames; cells of {cell} pixels; time {time}, space {space}"));
+    // Where the view turns quickly, and on a path shorter than the interval, they stand closer than asked for.
+    let intervals = if report.looping { *keys } else { keys.saturating_sub(1) };
+    let frames = if report.looping { report.frames } else { report.frames.saturating_sub(1) };
+    let every = match f64::from(frames) / intervals.max(1) as f64 {
+        mean if 1.5 * mean < f64::from(grid.key_interval) => format!("{mean:.1} frames on the mean"),
+        _ => format!("{} frames", grid.key_interval),
+    };
+    row("grid", format!("{keys} keys, one every {every}; cells of {cell} pixels; time {time}, space {space}"));
     if !grid.spaces.is_empty() {
         row("", straight::reason(&grid.spaces));
     }

@@ -2,7 +2,7 @@
 //! From the G-buffer; `fit` gives every sheet's corners their positions, `order` sorts them front to back.
 
 use crate::gbuffer::GBuffer;
-use cubist_core::format::{MAX_NODE_LAYERS, MAX_SHEETS, TIME_CUBIC};
+use cubist_core::format::{MAX_SHEETS, TIME_CUBIC};
 use cubist_core::grid::Grid;
 use cubist_core::timeline::weights;
 use rayon::prelude::*;
@@ -57,6 +57,12 @@ impl KeyGrid {
     #[must_use]
     pub fn intervals(&self) -> usize {
         if self.looping { self.keys.len() } else { (self.keys.len() - 1).max(1) }
+    }
+
+    /// Frames from key to key, on the mean, rounded up.
+    #[must_use]
+    pub fn spacing(&self) -> u32 {
+        self.end(self.intervals() - 1).div_ceil(self.intervals() as u32).max(1)
     }
 
     /// The frame where interval `interval` ends (that of its second key).
@@ -167,7 +173,7 @@ pub struct Sheets {
 #[must_use]
 pub fn find(gbuffer: &GBuffer, grid: &KeyGrid, least: u32) -> Sheets {
     let cells = grid.grid.cells();
-    let (mut found, dropped): (Vec<Counted>, Vec<u64>) = (0..grid.intervals() * cells)
+    let (found, dropped): (Vec<Vec<(u8, u32)>>, Vec<u64>) = (0..grid.intervals() * cells)
         .into_par_iter()
         .map(|index| {
             let mut counts: Vec<(u8, u32)> = Vec::new();
@@ -194,54 +200,9 @@ pub fn find(gbuffer: &GBuffer, grid: &KeyGrid, least: u32) -> Sheets {
             (counts, dropped + without)
         })
         .unzip();
-    let dropped = dropped.into_iter().sum::<u64>() + thin(&mut found, grid);
+    let dropped = dropped.into_iter().sum();
     let tests = vec![0; found.len()];
     Sheets { lists: found.into_iter().map(|list| list.into_iter().map(|(label, _)| label).collect()).collect(), tests, dropped }
-}
-
-/// The labels of a cell and how many pixels show each, most seen last.
-type Counted = Vec<(u8, u32)>;
-
-/// Takes the least seen labels out of the cells around nodes that would have to carry more than the format lets them: what it leaves out of a
-/// node by itself is the highest labels, however much shows them. Gives the number of pixels that showed what is left out.
-fn thin(found: &mut [Counted], grid: &KeyGrid) -> u64 {
-    let mut around: Vec<Vec<usize>> = vec![Vec::new(); grid.keys.len() * grid.grid.nodes()];
-    for index in 0..found.len() {
-        for at in grid.carriers(index) {
-            around[at].push(index);
-        }
-    }
-    let mut dropped = 0;
-    for around in around {
-        // Nearly everywhere nothing has to be counted.
-        if around.iter().map(|&index| found[index].len()).sum::<usize>() <= MAX_NODE_LAYERS {
-            continue;
-        }
-        loop {
-            let mut seen: Counted = Vec::new();
-            for &(label, count) in around.iter().flat_map(|&index| &found[index]) {
-                match seen.binary_search_by_key(&label, |&(label, _)| label) {
-                    Ok(at) => seen[at].1 += count,
-                    Err(at) => seen.insert(at, (label, count)),
-                }
-            }
-            if seen.len() <= MAX_NODE_LAYERS {
-                break;
-            }
-            // All that a cell shows stays. There are eight cells at most: others are left.
-            let alone = |label: u8| around.iter().any(|&index| matches!(found[index][..], [(only, _)] if only == label));
-            let Some(&(least, _)) = seen.iter().filter(|&&(label, _)| !alone(label)).min_by_key(|&&(label, count)| (count, label)) else {
-                break;
-            };
-            for &index in &around {
-                found[index].retain(|&(label, count)| {
-                    dropped += u64::from(count) * u64::from(label == least);
-                    label != least
-                });
-            }
-        }
-    }
-    dropped
 }
 
 /// The layers that nodes carry: for every key and node the labels of the cells around it, in the intervals that end
@@ -345,7 +306,7 @@ mod tests {
     }
 
     #[test]
-    fn nodes_carry_no_more_layers_than_there_is_room_for() {
+    fn nodes_carry_the_labels_of_all_cells_around() {
         // Two by two cells of 8 pixels, two intervals of two frames: in each of the eight nine labels that no other has, of 4 pixels or more.
         let (width, height, frames) = (16, 16, 5);
         let label = |at: u32| {
@@ -361,19 +322,11 @@ mod tests {
         let sheets = find(&gbuffer, &grid, 1);
         let layers = Layers::of(&grid, &sheets);
         let most = layers.start.windows(2).map(|pair| pair[1] - pair[0]).max();
-        assert_eq!(most, Some(MAX_NODE_LAYERS as u32), "as many as there is room for, at the node that all eight surround");
-        let sizes: Vec<usize> = sheets.lists.iter().map(Vec::len).collect();
-        assert_eq!(sizes.iter().sum::<usize>(), MAX_NODE_LAYERS, "{sizes:?}");
-        // What is most seen of a cell, as the last of its list, stays; and pixels that lose their sheet are counted.
+        assert_eq!(most, Some(72), "nine of each of the eight, at the node that all of them surround");
+        assert_eq!(sheets.dropped, 0);
+        // What is most seen of a cell is the last of its list.
         for (cell, list) in sheets.lists.iter().enumerate() {
-            assert_eq!(list.last(), Some(&(9 * cell as u8 + 9)), "{list:?}");
+            assert_eq!((list.len(), list.last()), (9, Some(&(9 * cell as u8 + 9))), "{list:?}");
         }
-        let lost = gbuffer.label.iter().enumerate().filter(|&(at, &label)| {
-            let (frame, x, y) = (at / 256, at % 16, at / 16 % 16);
-            let list = &sheets.lists[if frame < 2 { 0 } else { 4 } + x / 8 + y / 8 * 2];
-            !list.contains(&(label as u8))
-        });
-        assert_eq!(sheets.dropped, lost.count() as u64);
-        assert!(sheets.dropped > 0 && 5 * sheets.dropped < gbuffer.label.len() as u64, "{}", sheets.dropped);
     }
 }

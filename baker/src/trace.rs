@@ -40,6 +40,8 @@ struct Leaf {
     edge: [DVec3; 2],
     triangle: u32,
     masked: bool,
+    /// Rays pass through from behind.
+    front: bool,
 }
 
 impl Leaf {
@@ -163,8 +165,9 @@ impl<'a> Tracer<'a> {
             .map(|&triangle| {
                 let t = &scene.triangles[triangle as usize];
                 let [a, b, c] = t.position.map(|p| p - centre);
-                let masked = scene.materials.get(t.material as usize).is_some_and(|m| m.alpha_cutoff.is_some());
-                Leaf { corner: a, edge: [b - a, c - a], triangle, masked }
+                let material = scene.materials.get(t.material as usize);
+                let (masked, front) = (material.is_some_and(|m| m.alpha_cutoff.is_some()), material.is_some_and(|m| m.front));
+                Leaf { corner: a, edge: [b - a, c - a], triangle, masked, front }
             })
             .collect();
         Self { scene, hierarchy: Some(Arc::new(Hierarchy { boxes, leaves, centre })), seconds: start.elapsed().as_secs_f64() }
@@ -189,7 +192,7 @@ impl<'a> Tracer<'a> {
     }
 
     /// The closest hit in front of `origin`; of several at the same distance the one of the lowest triangle.
-    /// Texels that a material's alpha cuts out are passed through.
+    /// Texels that a material's alpha cuts out are passed through, and backs of what has a front alone.
     #[inline]
     pub fn hit(&self, origin: DVec3, direction: DVec3) -> Option<Hit> {
         let Hierarchy { boxes, leaves, centre } = self.hierarchy.as_deref()?;
@@ -243,6 +246,9 @@ impl<'a> Tracer<'a> {
     #[inline(always)]
     fn closer(&self, leaf: &Leaf, origin: DVec3, direction: DVec3, best: &mut Option<Hit>) -> Option<f32> {
         let (t, b, c, back) = leaf.intersect(origin, direction)?;
+        if back && leaf.front {
+            return None;
+        }
         if let Some(best) = best {
             let same = (t - best.t).abs() <= SAME * best.t;
             if if same { leaf.triangle >= best.triangle } else { t > best.t } {

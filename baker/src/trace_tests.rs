@@ -151,6 +151,25 @@ fn cut_out_texels_are_passed_through() {
 }
 
 #[test]
+fn what_has_a_front_alone_is_passed_through_from_behind() {
+    let corners = [DVec3::new(0.0, 0.0, 1.0), DVec3::new(1.0, 0.0, 1.0), DVec3::new(0.0, 1.0, 1.0)];
+    let pose = Pose::look_at(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, DVec3::Y, 50.0);
+    let mut s = scene(vec![triangle(corners), triangle(corners.map(|p| p - DVec3::Z))], pose);
+    s.materials.push(Material { front: true, ..Default::default() });
+    s.triangles[1].material = 1;
+    let tracer = Tracer::new(&s);
+    let seen = |z: f64| {
+        let (origin, direction) = (DVec3::new(0.2, 0.2, z), DVec3::NEG_Z * z.signum());
+        let alone = hit(&tracer, origin, direction).map(|hit| (hit.triangle, hit.back));
+        let [first, ..] = tracer.hits(origin, &[direction; PACKET]);
+        assert_eq!(first.map(|hit| (hit.triangle, hit.back)), alone);
+        alone
+    };
+    // From the front the nearer one; from behind the one that has two sides; between them the front again.
+    assert_eq!([seen(3.0), seen(-3.0), seen(0.5)], [Some((0, false)), Some((0, true)), Some((1, false))]);
+}
+
+#[test]
 fn an_empty_scene_is_background() {
     let s = scene(Vec::new(), Pose::look_at(DVec3::Z, DVec3::ZERO, DVec3::Y, 50.0));
     let hits = Hits::cast(&s, &Tracer::new(&s), &|_, _| {});

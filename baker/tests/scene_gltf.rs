@@ -130,6 +130,24 @@ fn lists_strips_and_fans_cover_the_same_square_facing_the_same_way() {
 }
 
 #[test]
+fn fronts_show_alone_unless_both_sides_are_asked_for_and_stay_fronts_in_a_mirror() {
+    for (material, front) in [(json!({}), true), (json!({ "doubleSided": true }), false)] {
+        let mut b = square();
+        b.push("materials", material);
+        b.json["meshes"][0]["primitives"][0]["material"] = json!(0);
+        let scene = b.load().unwrap();
+        let shown: Vec<bool> = scene.triangles.iter().map(|t| scene.materials[t.material as usize].front).collect();
+        assert_eq!(shown, [front; 2]);
+    }
+    // Mirrored left to right, the square faces the same way; turned around, the other.
+    for (node, facing) in [(json!({ "mesh": 0, "scale": [-1, 1, 1] }), 1.0), (json!({ "mesh": 0, "rotation": [0, 1, 0, 0] }), -1.0)] {
+        let mut b = square();
+        b.json["nodes"][0] = node;
+        assert!((area(&b.load().unwrap()).z - facing).abs() < 1e-12);
+    }
+}
+
+#[test]
 fn a_model_alone_gets_an_orbit_that_shows_all_of_it_and_a_light() {
     let scene = square().load().unwrap();
     assert_eq!((scene.playback.width, scene.playback.height, scene.playback.frames, scene.playback.fps), (320, 240, 120, 30));

@@ -12,8 +12,6 @@ pub const VERSION: u16 = 10;
 pub const MAX_SECTIONS: usize = 16;
 /// The most sheets a cell can hold: the tests of all but the last fit into 16 bits.
 pub const MAX_SHEETS: usize = 9;
-/// The most layers a node can hold: labels of the four cells around it in two intervals. Those past it are left out.
-pub const MAX_NODE_LAYERS: usize = 48;
 
 /// Tag of the section that holds the camera path: screen, timeline, keys. A [`Path`].
 pub const PATH: [u8; 4] = *b"PATH";
@@ -288,7 +286,7 @@ impl Path<'_> {
 /// played. [`Limits::seek_keys`] is checked against the key table when the bundle is parsed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct Limits {
-    /// Layers in a key, all nodes together.
+    /// Layers in a key, all nodes together, those of the backdrop left out.
     pub key_layers: u16,
     /// Layers in a row of nodes of a key.
     pub row_layers: u16,

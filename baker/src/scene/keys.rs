@@ -2,7 +2,10 @@
 //! Text comes from `file`; what is out of range is judged there.
 
 use super::error::{SceneError, nearest};
-use serde::Deserialize;
+use serde::de::{Error, SeqAccess, Visitor};
+use serde::{Deserialize, Deserializer};
+use std::fmt;
+use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use toml::de::{DeTable, DeValue};
 
@@ -36,7 +39,9 @@ pub(crate) struct SceneTable {
 pub(crate) struct HeightTable {
     pub heights: PathBuf,
     pub colour: Option<PathBuf>,
+    #[serde(deserialize_with = "list")]
     pub size: [f64; 2],
+    #[serde(default, deserialize_with = "maybe")]
     pub range: Option<[f64; 2]>,
 }
 
@@ -45,6 +50,7 @@ pub(crate) struct HeightTable {
 #[serde(deny_unknown_fields)]
 pub(crate) struct CameraTable {
     pub fov: Option<f64>,
+    #[serde(default, deserialize_with = "maybe")]
     pub up: Option<[f64; 3]>,
     pub orbit: Option<OrbitTable>,
     pub line: Option<LineTable>,
@@ -57,11 +63,12 @@ pub(crate) struct CameraTable {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct OrbitTable {
+    #[serde(deserialize_with = "list")]
     pub target: [f64; 3],
     pub radius: f64,
-    #[serde(default = "full_circle")]
+    #[serde(default = "full_circle", deserialize_with = "list")]
     pub azimuth: [f64; 2],
-    #[serde(default)]
+    #[serde(default, deserialize_with = "list")]
     pub elevation: [f64; 2],
 }
 
@@ -69,9 +76,13 @@ pub(crate) struct OrbitTable {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct LineTable {
+    #[serde(deserialize_with = "list")]
     pub from: [f64; 3],
+    #[serde(deserialize_with = "list")]
     pub to: [f64; 3],
+    #[serde(default, deserialize_with = "maybe")]
     pub look: Option<[f64; 3]>,
+    #[serde(default, deserialize_with = "maybe")]
     pub look_at: Option<[f64; 3]>,
 }
 
@@ -79,7 +90,9 @@ pub(crate) struct LineTable {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct SplineTable {
+    #[serde(deserialize_with = "lists")]
     pub points: Vec<[f64; 3]>,
+    #[serde(deserialize_with = "lists")]
     pub look_at: Vec<[f64; 3]>,
 }
 
@@ -87,10 +100,11 @@ pub(crate) struct SplineTable {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PivotTable {
+    #[serde(deserialize_with = "list")]
     pub eye: [f64; 3],
-    #[serde(default = "full_circle")]
+    #[serde(default = "full_circle", deserialize_with = "list")]
     pub azimuth: [f64; 2],
-    #[serde(default)]
+    #[serde(default, deserialize_with = "list")]
     pub elevation: [f64; 2],
 }
 
@@ -98,6 +112,7 @@ pub(crate) struct PivotTable {
 #[derive(Deserialize, Default)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct PlaybackTable {
+    #[serde(default, deserialize_with = "maybe")]
     pub size: Option<[i64; 2]>,
     pub frames: Option<i64>,
     pub fps: Option<i64>,
@@ -108,11 +123,50 @@ pub(crate) struct PlaybackTable {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct LightTable {
+    #[serde(deserialize_with = "list")]
     pub direction: [f64; 3],
     #[serde(default = "white")]
     pub colour: String,
     #[serde(default = "one")]
     pub intensity: f64,
+}
+
+/// A list of exactly N values: of a longer one serde's own arrays take the first and say nothing.
+struct List<T, const N: usize>([T; N]);
+
+impl<'de, T: Deserialize<'de>, const N: usize> Deserialize<'de> for List<T, N> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        struct Values<T, const N: usize>(PhantomData<T>);
+        impl<'de, T: Deserialize<'de>, const N: usize> Visitor<'de> for Values<T, N> {
+            type Value = List<T, N>;
+
+            fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                write!(f, "an array of length {N}")
+            }
+
+            fn visit_seq<A: SeqAccess<'de>>(self, mut values: A) -> Result<Self::Value, A::Error> {
+                let mut all = Vec::new();
+                while let Some(value) = values.next_element()? {
+                    all.push(value);
+                }
+                let count = all.len();
+                all.try_into().map(List).map_err(|_| A::Error::invalid_length(count, &self))
+            }
+        }
+        deserializer.deserialize_seq(Values(PhantomData))
+    }
+}
+
+fn list<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(deserializer: D) -> Result<[T; N], D::Error> {
+    List::deserialize(deserializer).map(|List(values)| values)
+}
+
+fn maybe<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(deserializer: D) -> Result<Option<[T; N]>, D::Error> {
+    list(deserializer).map(Some)
+}
+
+fn lists<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(deserializer: D) -> Result<Vec<[T; N]>, D::Error> {
+    Ok(Vec::deserialize(deserializer)?.into_iter().map(|List(values)| values).collect())
 }
 
 fn full_circle() -> [f64; 2] {

@@ -9,9 +9,11 @@ mod heightfield;
 mod keys;
 mod load;
 mod model;
+mod mtl;
 mod obj;
 mod picture;
 mod ply;
+mod polygon;
 mod turned;
 
 pub use error::SceneError;
@@ -47,6 +49,8 @@ pub struct Material {
     pub colour: Vec3,
     /// Index into [`Scene::textures`].
     pub texture: Option<u32>,
+    /// Only the counterclockwise side shows: rays pass through from behind.
+    pub front: bool,
     /// Texels whose alpha is below this are holes that rays pass through; `None`: opaque.
     pub alpha_cutoff: Option<f32>,
     /// Alpha of the base colour factor: multiplies the texture's. That of vertices is ignored.
@@ -57,7 +61,7 @@ pub struct Material {
 
 impl Default for Material {
     fn default() -> Self {
-        Self { colour: Vec3::ONE, texture: None, alpha_cutoff: None, alpha: 1.0, unlit: false }
+        Self { colour: Vec3::ONE, texture: None, front: false, alpha_cutoff: None, alpha: 1.0, unlit: false }
     }
 }
 

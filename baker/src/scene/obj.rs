@@ -3,8 +3,8 @@
 
 use super::error::{SceneError, Warnings};
 use super::model::{MAX_TRIANGLES, Model, too_many};
-use super::picture;
-use super::{Material, Texture, Triangle, Wrap};
+use super::mtl::{self, Trouble, map_name};
+use super::{Material, Texture, Triangle, Wrap, picture, polygon};
 use crate::files::{beside, read as read_file};
 use glam::{DVec3, Vec2, Vec3};
 use std::cell::RefCell;
@@ -21,22 +21,20 @@ pub(crate) fn load(path: &Path, texture: Option<&Path>) -> Result<Model, SceneEr
 fn model(text: &str, folder: &Path, fallback: Option<&Path>) -> Result<Model, String> {
     let mut model = Model::default();
     let clean = check(text, &mut model.warnings)?;
-    let trouble = RefCell::new(Vec::new());
+    let trouble = RefCell::new(Trouble::default());
     let options = tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, single_index: false };
-    let library = |name: &Path| {
-        let loaded = read_library(name, folder);
-        loaded.unwrap_or_else(|e| {
-            trouble.borrow_mut().push(e);
-            Ok(Default::default())
-        })
-    };
+    let library = |name: &Path| mtl::read(name, folder, &mut trouble.borrow_mut());
     let (objects, materials) =
         tobj::load_obj_buf(&mut clean.as_bytes(), &options, library).map_err(|e| format!("{e}: export the file again"))?;
-    for e in trouble.into_inner() {
-        model.warnings.add(e);
+    let Trouble { told, lost } = trouble.into_inner();
+    told.into_iter().for_each(|what| model.warnings.add(what));
+    let materials = materials.map_err(|e| format!("materials: {e}"))?;
+    let used = clean.lines().filter_map(|line| line.strip_prefix("usemtl "));
+    for name in used.filter(|name| !lost && materials.iter().all(|m| m.name != *name)) {
+        model.warnings.add(format!("material \"{name}\" is in no library: left white"));
     }
     let mut textures = Shelf::default();
-    for m in materials.map_err(|e| format!("materials: {e}"))? {
+    for m in materials {
         let look = look(&m, folder, &mut textures, &mut model.warnings)?;
         model.materials.push(look);
     }
@@ -67,6 +65,7 @@ fn check(text: &str, warnings: &mut Warnings) -> Result<String, String> {
     // Number 1 of each stands for "none": left to itself, `tobj` gives such corners the ones of the corner before.
     clean.push_str("vt 0 1\nvn 0 0 0\n");
     let (mut vertices, mut coloured, mut uvs, mut normals, mut triangles) = (0i64, 0i64, 0i64, 0i64, 0usize);
+    let mut positions = Vec::new();
     let mut lines = text.lines().enumerate();
     // Forward references are allowed: absolute indices are held against the whole file at the end.
     let mut highest = [(0i64, 0usize); 3];
@@ -90,6 +89,7 @@ fn check(text: &str, warnings: &mut Warnings) -> Result<String, String> {
                 match word {
                     "v" => {
                         vertices += 1;
+                        positions.push(Vec3::from_slice(&v[..3]).as_dvec3());
                         coloured += i64::from(v.len() >= 6);
                         clean.push_str(&format!("v {} {} {}", v[0], v[1], v[2]));
                         if let [_, _, _, r, g, b, ..] = v[..] {
@@ -158,6 +158,7 @@ fn check(text: &str, warnings: &mut Warnings) -> Result<String, String> {
     if triangles > MAX_TRIANGLES {
         return Err(too_many(triangles));
     }
+    let mut clean = cut(&clean, &positions);
     if coloured > 0 && coloured < vertices {
         warnings.add(format!("only {coloured} of {vertices} vertices have colours: they are ignored"));
         clean = clean
@@ -171,42 +172,28 @@ fn check(text: &str, warnings: &mut Warnings) -> Result<String, String> {
     Ok(clean)
 }
 
-/// Reads a material library, of it only the lines that are shown: anything else in it may be as odd as it likes.
-fn read_library(name: &Path, folder: &Path) -> Result<tobj::MTLLoadResult, String> {
-    let path = beside(&name.to_string_lossy(), folder);
-    let bytes = read_file(&path).map_err(|e| format!("material library {}: {e}: its materials are left white", path.display()))?;
-    let text = String::from_utf8_lossy(&bytes);
-    let known = ["newmtl", "Kd", "Ke", "d", "Tr", "map_Kd", "map_d"];
-    let lines: Vec<&str> =
-        text.lines().map(str::trim).filter(|l| l.split_whitespace().next().is_some_and(|w| known.contains(&w))).collect();
-    let loaded = tobj::load_mtl_buf(&mut lines.join("\n").as_bytes());
-    if let Err(e) = loaded {
-        return Err(format!("material library {}: {e}: its materials are left white", path.display()));
-    }
-    Ok(loaded)
-}
-
-/// The file name at the end of a map statement, after its options.
-fn map_name(statement: &str) -> &str {
-    let mut rest = statement.trim();
-    while let Some(option) = rest.strip_prefix('-') {
-        let (name, mut tail) = option.split_once(char::is_whitespace).unwrap_or((option, ""));
-        // Numbers belong to the option; others take one word.
-        let mut words = usize::from(!matches!(name, "s" | "o" | "t" | "mm" | "bm" | "boost" | "texres"));
-        loop {
-            let (word, after) = tail.trim_start().split_once(char::is_whitespace).unwrap_or((tail.trim_start(), ""));
-            if after.is_empty() || (words == 0 && word.parse::<f32>().is_err()) {
-                break;
-            }
-            words = words.saturating_sub(1);
-            tail = after;
-            if words == 0 && !matches!(name, "s" | "o" | "t" | "mm" | "bm" | "boost" | "texres") {
-                break;
-            }
+/// The same text with polygons that are no fans cut into triangles: `tobj` makes fans of all.
+fn cut(text: &str, positions: &[DVec3]) -> String {
+    let mut whole = String::with_capacity(text.len());
+    for line in text.lines() {
+        let corners: Vec<&str> = line.strip_prefix("f ").map_or(Vec::new(), |corners| corners.split(' ').collect());
+        let position =
+            |corner: &&str| corner.split('/').next()?.parse::<usize>().ok().and_then(|v| positions.get(v.checked_sub(1)?)).copied();
+        let triangles = match corners.len() {
+            // Most faces are triangles.
+            0..4 => Vec::new(),
+            _ => polygon::triangles(&corners.iter().filter_map(position).collect::<Vec<_>>()),
+        };
+        if triangles.iter().enumerate().all(|(at, triangle)| *triangle == [0, at + 1, at + 2]) {
+            whole.extend([line, "\n"]);
+            continue;
         }
-        rest = tail.trim();
+        for triangle in triangles {
+            let [a, b, c] = triangle.map(|at| corners[at]);
+            whole.push_str(&format!("f {a} {b} {c}\n"));
+        }
     }
-    rest
+    whole
 }
 
 /// The textures decoded so far, by what names them.
@@ -307,13 +294,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn map_options_are_skipped() {
-        assert_eq!(map_name("wall brick.png"), "wall brick.png");
-        assert_eq!(map_name("-s 2 2 1 -clamp on wall brick.png"), "wall brick.png");
-        assert_eq!(map_name("-bm 0.5 a.png"), "a.png");
-    }
-
-    #[test]
     fn faults_name_their_line() {
         let check = |t: &str| check(t, &mut Warnings::default());
         assert_eq!(check("v 0 0 0\nv 1 0 0\nf 1 2 9\n").unwrap_err(), "line 3: index 9 of 2 vertices");
@@ -322,5 +302,16 @@ mod tests {
         assert!(check("v 0 nan 0\n").unwrap_err().starts_with("line 1"));
         assert!(check("v 0 0 0\nf -1 -2 -1\n").unwrap_err().contains("index -2 of 1 vertices so far"));
         assert_eq!(check("v 0 0 0 1 # w\nv 1 0 \\\n0\nf 1 2 -1\n").unwrap(), "vt 0 1\nvn 0 0 0\nv 0 0 0\nv 1 0 0\nf 1/1/1 2/1/1 2/1/1\n");
+    }
+
+    #[test]
+    fn notches_of_polygons_stay_open() {
+        let ell = "v 0 0 0\nv 3 0 0\nv 3 1 0\nv 1 1 0\nv 1 3 0\nv 0 3 0\n";
+        let area = |faces: &str| {
+            let model = model(&format!("{ell}{faces}"), Path::new(""), None).unwrap();
+            let areas = model.triangles.iter().map(|t| (t.position[1] - t.position[0]).cross(t.position[2] - t.position[0]).length() / 2.0);
+            areas.sum::<f64>()
+        };
+        assert_eq!([area("f 1 2 3 4 5 6\n"), area("f 3 4 5 6 1 2\n"), area("f 6 5 4 3 2 1\n")], [5.0; 3]);
     }
 }

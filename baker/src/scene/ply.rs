@@ -3,8 +3,7 @@
 
 use super::error::SceneError;
 use super::model::{MAX_TRIANGLES, Model, too_many};
-use super::picture;
-use super::{Material, Triangle, Wrap};
+use super::{Material, Triangle, Wrap, picture, polygon};
 use crate::files::{beside, read as read_file};
 use glam::{DVec3, Vec2, Vec3};
 use ply_rs_bw::parser::{Parser, Reader};
@@ -193,8 +192,9 @@ fn model(bytes: &[u8], folder: &Path, fallback: Option<&Path>) -> Result<Model, 
         if corners.len() < 3 {
             model.warnings.add("faces of fewer than three corners are not shown");
         }
-        for pair in corners.get(1..).unwrap_or(&[]).windows(2) {
-            push(&mut model, [corners[0], pair[0], pair[1]], &vertices)?;
+        let positions: Vec<DVec3> = corners.iter().map(|&corner| vertices[corner].position).collect();
+        for triangle in polygon::triangles(&positions) {
+            push(&mut model, triangle.map(|at| corners[at]), &vertices)?;
         }
     }
     for (i, strip) in strips.iter().enumerate() {

@@ -1,11 +1,14 @@
 //! Clips: all frames of a scene as raw pictures, and how like each other two of them are.
 //! Frames come from exact rays, from the truth, from the player and from codecs; scores go to the codec table.
 
+use crate::play;
+use anyhow::Result;
 use cubist_baker::atlas::Atlas;
 use cubist_baker::metrics::{mean_squared_error, psnr, ssim};
 use cubist_baker::scene::Scene;
 use cubist_baker::truth::Truth;
-use cubist_baker::verify::{self, VerifyError, exact_frame};
+use cubist_baker::verify::{exact_frame, rgb};
+use cubist_core::{AnyTexels, Player};
 
 /// Width and height, pixels, and frames.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -65,13 +68,13 @@ pub fn truth(scene: &Scene) -> Vec<u8> {
     (0..scene.playback.frames).flat_map(|frame| truth.frame(frame)).collect()
 }
 
-/// What the player shows of a bundle of `frames` frames.
+/// What the player shows of a bundle of `frames` frames whose rows `draw` draws.
 ///
 /// # Errors
 /// The player refuses the bytes.
-pub fn played(bytes: &[u8], frames: u32) -> Result<Vec<u8>, VerifyError> {
+pub fn played(bytes: &[u8], frames: u32, draw: fn(&mut Player<'_, AnyTexels>, u32, &mut [u16])) -> Result<Vec<u8>> {
     let mut clip = Vec::new();
-    verify::play(bytes, &(0..frames).collect::<Vec<_>>(), |_, picture| clip.extend_from_slice(picture))?;
+    play::visit_as::<AnyTexels>(bytes, 0..frames, |_, player| clip.extend(play::whole(player, draw).into_iter().flat_map(rgb)))?;
     Ok(clip)
 }
 

@@ -55,7 +55,7 @@ pub fn measure(scene: &Scene, ffmpeg: Option<&Ffmpeg>) -> Result<Value> {
     let shape = Shape::of(scene);
     let folder = tempfile::tempdir().context("make a temporary folder")?;
     let source = Source::new(shape, clip::exact(&baked.flat.atlas), folder.path(), "exact")?;
-    let asked = source.compare(&clip::played(&baked.bundle, shape.frames)?).psnr;
+    let asked = source.compare(&clip::played(&baked.bundle, shape.frames, |player, y, out| player.row(y, out))?).psnr;
     for codec in Codec::all(ffmpeg, [1, 1], shape) {
         let name = codec.name();
         let Some(key) = ["mjpeg", "gif"].into_iter().find(|key| name.to_lowercase().starts_with(key)) else { continue };

@@ -1,14 +1,17 @@
-//! The codec table: bytes of a bundle beside those that other codecs take to be as good, by PSNR and by SSIM, against exact rays and
-//! against the antialiased truth. Scenes come from the command `table`, codecs from `crate::codecs`.
+//! The codec table: bytes of a bundle, its source image packed, beside those that other codecs take to be as good, by PSNR and by SSIM: against exact
+//! rays, and against the antialiased truth, rows drawn plainly or as finely as the player can. Scenes come from the command `table`, codecs from
+//! `crate::codecs`.
 
 use super::{Table, markdown, number};
 use crate::codecs::clip::{self, Likeness, Shape};
 use crate::codecs::ffmpeg::Ffmpeg;
 use crate::codecs::search::Match;
 use crate::codecs::{Codec, Metric, Source};
-use crate::{figures, scenes};
 use anyhow::{Context, Result};
+use cubist_baker::TruthFrames;
+use cubist_baker::atlas::Storage;
 use cubist_baker::bake::Settings;
+use cubist_baker::job::{self, Baked, Options};
 use cubist_baker::scene::Scene;
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -17,15 +20,29 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// The scenes of the table unless others are named.
 pub const SCENES: [&str; 4] = ["cone-orbit", "street", "torus", "arch"];
 
-/// The comparisons: the key in JSON, the title, whether with the truth, by what.
-const COMPARISONS: [(&str, &str, bool, Metric); 4] = [
-    ("exact_psnr", "exact, PSNR", false, Metric::Psnr),
-    ("exact_ssim", "exact, SSIM", false, Metric::Ssim),
-    ("truth_psnr", "truth, PSNR", true, Metric::Psnr),
-    ("truth_ssim", "truth, SSIM", true, Metric::Ssim),
+/// How the player draws, and what that is compared with.
+#[derive(Clone, Copy)]
+enum View {
+    /// `row` beside exact rays.
+    Exact,
+    /// `row` beside the truth.
+    Truth,
+    /// `fine_row` beside the truth.
+    Fine,
+}
+
+/// The comparisons: the key in JSON, the title, of what, by what.
+const COMPARISONS: [(&str, &str, View, Metric); 6] = [
+    ("exact_psnr", "exact, PSNR", View::Exact, Metric::Psnr),
+    ("exact_ssim", "exact, SSIM", View::Exact, Metric::Ssim),
+    ("truth_psnr", "truth, PSNR", View::Truth, Metric::Psnr),
+    ("truth_ssim", "truth, SSIM", View::Truth, Metric::Ssim),
+    ("fine_psnr", "fine, PSNR", View::Fine, Metric::Psnr),
+    ("fine_ssim", "fine, SSIM", View::Fine, Metric::Ssim),
 ];
 
-/// The key frame intervals of codecs that have such: as far apart as a default bundle's keys that need no earlier one, and as all its keys.
+/// The key frame intervals of codecs that have such: of bundles whose keys are as far apart as they are unless the baker finds better, that of keys that need
+/// no earlier one, and that of all keys.
 fn gops() -> [u32; 2] {
     let settings = Settings::default();
     [settings.key_interval * settings.coding.independent_every as u32, settings.key_interval]
@@ -35,8 +52,10 @@ fn gops() -> [u32; 2] {
 struct Ours {
     key_bytes_per_frame: f64,
     bytes_per_frame: f64,
-    /// Against exact rays and against the truth.
-    likeness: [Likeness; 2],
+    /// The same where its source image is raw.
+    raw_bytes_per_frame: f64,
+    /// By [`View`].
+    likeness: [Likeness; 3],
 }
 
 /// The rows of one scene: the bundle's, then every codec's.
@@ -45,19 +64,23 @@ struct Ours {
 /// The baker's, those of temporary files, and what ffmpeg says.
 pub fn measure(scene: &Scene, ffmpeg: Option<&Ffmpeg>) -> Result<Vec<Value>> {
     eprintln!("{}: baking", scene.name);
-    let (flat, encoded) = scenes::painted(scene, &Settings::default())?;
+    let options = Options { storage: Some(Storage::Packed), truth: TruthFrames::None, ..Options::default() };
+    let Baked { bundle, report, flat, .. } = job::run(scene, &options, &|_, _| {}).with_context(|| format!("bake {}", scene.name))?;
     eprintln!("{}: rendering the truth", scene.name);
     let shape = Shape::of(scene);
     let folder = tempfile::tempdir().context("make a temporary folder")?;
-    let sources = [
-        Source::new(shape, clip::exact(&flat.atlas), folder.path(), "exact")?,
-        Source::new(shape, clip::truth(scene), folder.path(), "truth")?,
-    ];
-    let played = clip::played(&encoded.bundle, shape.frames)?;
+    let exact = Source::new(shape, clip::exact(&flat.atlas), folder.path(), "exact")?;
+    let truth = Source::new(shape, clip::truth(scene), folder.path(), "truth")?;
+    let sources = [&exact, &truth, &truth];
+    let plain = clip::played(&bundle, shape.frames, |player, y, out| player.row(y, out))?;
+    let fine = clip::played(&bundle, shape.frames, |player, y, out| player.fine_row(y, out))?;
+    let frames = f64::from(shape.frames);
+    let (picture, bytes) = (&report.source_image, report.bytes.bundle);
     let ours = Ours {
-        key_bytes_per_frame: figures::key_bytes_per_frame(&encoded.bundle)?,
-        bytes_per_frame: encoded.bundle.len() as f64 / f64::from(shape.frames),
-        likeness: [0, 1].map(|i: usize| sources[i].compare(&played)),
+        key_bytes_per_frame: report.bytes.keys_per_frame,
+        bytes_per_frame: bytes as f64 / frames,
+        raw_bytes_per_frame: (bytes + picture.raw_bytes - picture.stored_bytes) as f64 / frames,
+        likeness: [exact.compare(&plain), truth.compare(&plain), truth.compare(&fine)],
     };
     let codecs = Codec::all(ffmpeg, gops(), shape);
     let jobs: Vec<(usize, usize)> = (0..codecs.len()).flat_map(|codec| (0..COMPARISONS.len()).map(move |c| (codec, c))).collect();
@@ -65,9 +88,8 @@ pub fn measure(scene: &Scene, ffmpeg: Option<&Ffmpeg>) -> Result<Vec<Value>> {
     let found = jobs
         .par_iter()
         .map(|&(codec, comparison)| {
-            let (_, title, truth, metric) = COMPARISONS[comparison];
-            let asked = metric.of(ours.likeness[usize::from(truth)]);
-            let found = codecs[codec].equal(&sources[usize::from(truth)], metric, asked);
+            let (_, title, view, metric) = COMPARISONS[comparison];
+            let found = codecs[codec].equal(sources[view as usize], metric, metric.of(ours.likeness[view as usize]));
             let done = done.fetch_add(1, Ordering::Relaxed) + 1;
             eprintln!("{}: {done} of {} comparisons: {}, {title}", scene.name, jobs.len(), codecs[codec].name());
             found
@@ -90,9 +112,10 @@ fn own(scene: &Scene, ours: &Ours) -> Value {
         "frames": scene.playback.frames,
         "key_bytes_per_frame": ours.key_bytes_per_frame,
         "bytes_per_frame": ours.bytes_per_frame,
+        "raw_bytes_per_frame": ours.raw_bytes_per_frame,
     });
-    for (key, _, truth, metric) in COMPARISONS {
-        row[key] = json!({ "reached": metric.of(ours.likeness[usize::from(truth)]) });
+    for (key, _, view, metric) in COMPARISONS {
+        row[key] = json!({ "reached": metric.of(ours.likeness[view as usize]) });
     }
     row
 }
@@ -127,6 +150,7 @@ pub fn table(rows: Vec<Value>, ffmpeg: Option<&Ffmpeg>) -> Table {
         let reached = number(&comparison["reached"], digits(metric)) + unit(metric);
         let bytes = format!("{} ({})", number(&comparison["bytes_per_frame"], 0), number(&comparison["factor"], 2));
         match comparison["match"].as_str() {
+            None if comparison.is_null() => String::new(),
             None => reached,
             Some("equal") => bytes,
             Some("coarsest") => format!("at most {bytes}"),
@@ -135,7 +159,8 @@ pub fn table(rows: Vec<Value>, ffmpeg: Option<&Ffmpeg>) -> Table {
     };
     let line = |row: &Value| {
         let keys = &row["key_bytes_per_frame"];
-        let own = if keys.is_null() { String::new() } else { format!("{} ({} keys)", number(&row["bytes_per_frame"], 0), number(keys, 0)) };
+        let [packed, raw] = ["bytes_per_frame", "raw_bytes_per_frame"].map(|key| number(&row[key], 0));
+        let own = if keys.is_null() { String::new() } else { format!("{packed} ({} keys; raw {raw})", number(keys, 0)) };
         let mut cells = vec![text(row, "scene"), text(row, "codec"), own];
         cells.extend(COMPARISONS.map(|(key, _, _, metric)| cell(row, key, metric)));
         cells
@@ -154,21 +179,25 @@ pub fn table(rows: Vec<Value>, ffmpeg: Option<&Ffmpeg>) -> Table {
 mod tests {
     use super::*;
     use crate::codecs::search::Point;
+    use crate::scenes;
 
     fn ours() -> Ours {
         let likeness = Likeness { psnr: 30.0, ssim: 0.95 };
-        Ours { key_bytes_per_frame: 100.0, bytes_per_frame: 1000.0, likeness: [likeness; 2] }
+        Ours { key_bytes_per_frame: 100.0, bytes_per_frame: 1000.0, raw_bytes_per_frame: 3000.0, likeness: [likeness; 3] }
     }
 
     #[test]
     fn cells_say_bytes_factor_and_what_is_not_equal() {
         let scene = scenes::reduced("pyramid", [64, 48], 8).unwrap();
         let point = |score| Point { bytes: 4000.0, score };
-        let found = [Some(Match::Equal(16000.0)), Some(Match::Coarsest(point(0.97))), Some(Match::Short(point(28.0))), None];
+        let found = [Some(Match::Equal(16000.0)), Some(Match::Coarsest(point(0.97))), Some(Match::Short(point(28.0))), None, None, None];
         let table = table(vec![own(&scene, &ours()), row(&scene, "MJPEG", &found, &ours())], None);
         let lines: Vec<&str> = table.markdown.lines().collect();
-        assert_eq!(lines[2], "| pyramid | Cubist | 1000 (100 keys) | 30.00 dB | 0.9500 | 30.00 dB | 0.9500 |");
-        assert_eq!(lines[3], "| pyramid | MJPEG |  | 2000 (2.00) | at most 500 (0.50) | short: 500 (0.50) at 28.00 dB |  |");
+        assert_eq!(
+            lines[2],
+            "| pyramid | Cubist | 1000 (100 keys; raw 3000) | 30.00 dB | 0.9500 | 30.00 dB | 0.9500 | 30.00 dB | 0.9500 |"
+        );
+        assert_eq!(lines[3], "| pyramid | MJPEG |  | 2000 (2.00) | at most 500 (0.50) | short: 500 (0.50) at 28.00 dB |  |  |  |");
         assert_eq!(lines[5], "64 x 48 pixels, 8 frames; no ffmpeg.");
         assert_eq!(table.json[1]["exact_psnr"]["factor"], 2.0);
     }

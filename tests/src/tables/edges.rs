@@ -2,9 +2,10 @@
 //! Scenes come from the command `table`; every picture is compared with the antialiased scene itself.
 
 use super::{Table, markdown, number};
-use crate::{play, scenes};
-use anyhow::Result;
-use cubist_baker::bake::Settings;
+use crate::play;
+use anyhow::{Context, Result};
+use cubist_baker::TruthFrames;
+use cubist_baker::job::{self, Baked, Options};
 use cubist_baker::metrics;
 use cubist_baker::scene::Scene;
 use cubist_baker::truth::{Truth, spread};
@@ -32,13 +33,14 @@ struct Drawn {
 /// The baker's.
 pub fn measure(scene: &Scene) -> Result<Value> {
     eprintln!("{}: baking", scene.name);
-    let (_, encoded) = scenes::painted(scene, &Settings::default())?;
+    let options = Options { truth: TruthFrames::None, ..Options::default() };
+    let Baked { bundle, .. } = job::run(scene, &options, &|_, _| {}).with_context(|| format!("bake {}", scene.name))?;
     eprintln!("{}: comparing", scene.name);
     let truth = Truth::new(scene);
     let frames = spread(scene.playback.frames, COMPARED);
     let (width, pixels) = (scene.playback.width as usize, scene.playback.width as usize * scene.playback.height as usize);
     let (mut ways, mut smoothed): ([Drawn; 5], u64) = Default::default();
-    play::visit(&encoded.bundle, frames.iter().copied(), |frame, player| {
+    play::visit(&bundle, frames.iter().copied(), |frame, player| {
         let exact = truth.frame(frame);
         let draw = |drawn: &mut Drawn, player: &mut Player<'_>, row: fn(&mut Player<'_>, u32, &mut [u16])| {
             let start = Instant::now();

@@ -91,7 +91,7 @@ fn one(shelf: &mut Shelf<'_>, m: &json::Material, name: &str, model: &mut Model)
         alpha * f32::from(lowest) / 255.0 < *c
     });
     let colour = Vec3::new(factor[0], factor[1], factor[2]).clamp(Vec3::ZERO, Vec3::ONE);
-    model.materials.push(Material { colour, texture, alpha_cutoff: cutoff, alpha, unlit });
+    model.materials.push(Material { colour, texture, front: !m.double_sided, alpha_cutoff: cutoff, alpha, unlit });
     Ok(info.filter(|_| texture.is_some()).map(mapping))
 }
 

@@ -211,6 +211,8 @@ fn place_one(p: &Primitive, world: DMat4, skin: Option<&[DMat4]>, model: &mut Mo
         DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y))
     };
     let turn = |n: &Vec3, m: DMat3| (m * n.as_dvec3()).try_normalize().map_or(Vec3::ZERO, |n| n.as_vec3());
+    // A mirror turns what goes around to the left: the front stays in front.
+    let mut mirrored = world.determinant() < 0.0;
     let (positions, normals): (Vec<DVec3>, Vec<Vec3>) = match skin {
         None => {
             let m = cofactors(world);
@@ -221,6 +223,9 @@ fn place_one(p: &Primitive, world: DMat4, skin: Option<&[DMat4]>, model: &mut Mo
             let mut normals = Vec::with_capacity(p.normals.len());
             for (i, v) in p.positions.iter().enumerate() {
                 let m = blend(p, i, joints)?.unwrap_or(world);
+                if i == 0 {
+                    mirrored = m.determinant() < 0.0;
+                }
                 positions.push(m.transform_point3(*v));
                 if let Some(n) = p.normals.get(i) {
                     normals.push(turn(n, cofactors(m)));
@@ -231,7 +236,8 @@ fn place_one(p: &Primitive, world: DMat4, skin: Option<&[DMat4]>, model: &mut Mo
     };
     model.coloured |= !p.colours.is_empty();
     for c in &p.corners {
-        let at = c.map(|i| i as usize);
+        let [a, b, c] = c.map(|i| i as usize);
+        let at = if mirrored { [a, c, b] } else { [a, b, c] };
         let normal = at.map(|i| normals.get(i).copied().unwrap_or(Vec3::ZERO));
         model.triangles.push(Triangle {
             position: at.map(|i| positions[i]),
