@@ -65,8 +65,8 @@ pub struct Bake {
     pub playback: Playback,
     /// Side of a cell of the key-ray grid, pixels: 4, 8, 16 or 32 [default: 8; 16 on screens over 640 wide].
     ///
-    /// Smaller cells follow outlines better and take more bytes and memory. Cells of 16 are what small memories want first: half of it or less, a sixth to
-    /// half fewer bytes of keys, and up to a tenth fewer instructions. Scenes of large flat faces show hardly a difference on a display then, models
+    /// Smaller cells follow outlines better and take more bytes and memory. Cells of 16 are what small memories want first: half of it or so, a sixth to
+    /// half fewer bytes of keys, and up to an eighth fewer instructions. Scenes of large flat faces show hardly a difference on a display then, models
     /// lose .5 to 3.5 dB.
     ///
     /// Where neither this nor --key-interval is given, lattices and foliage get cells half as large with keys twice as far apart, and rough land cells
@@ -173,7 +173,7 @@ pub struct Bake {
     /// --psnr take 1.
     #[arg(long, value_enum, value_name = "BITS", default_value_t = Outlines::Auto)]
     pub outline: Outlines,
-    /// Every Nth key needs no earlier one: a seek decodes at most N + 1 keys.
+    /// Every Nth key needs no earlier one: a seek decodes at most N + 3 keys, N + 1 where time is straight or held.
     #[arg(long, value_name = "N", default_value_t = 16, value_parser = clap::value_parser!(u16).range(1..=1000))]
     pub independent_every: u16,
     /// The whole bundle takes at most this many bytes (also 256K, 2M), at the best quality that does.

@@ -405,7 +405,7 @@ impl Inspection {
         let l = &self.limits;
         line(format!("Memory  {} bytes of working memory and a row of {} bytes", self.workspace, width * 2));
         line(format!(
-            "Limits  a key: {} layers in {} chains, {} of them with {} fields, {} bytes of sheet lists; a row: {} layers in {} chains, {} sheets; a \
+            "Limits  a key: {} layers in {} chains, room for {} with {} fields, {} bytes of sheet lists; a row: {} layers in {} chains, {} sheets; a \
              cell: {} sheets; a seek: {} keys",
             l.key_layers,
             l.key_chains,

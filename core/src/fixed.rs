@@ -1,5 +1,5 @@
 //! Fixed-point numbers: how coordinates are stored in keys, how they are interpolated.
-//! Values come from `key`, weights from `timeline`; results go to `row` and `sheet`.
+//! `key`, `timeline`, `row` and what draws share them.
 //!
 //! A number's unit goes with its place: stored positions count 1/32 to 1/128 texel, as the bundle says, playback's are Q15.16 texels; time weights are Q14;
 //! a field is a code from -37 to 37 where it is stored, Q8 pixels in a key, Q16 pixels during playback.

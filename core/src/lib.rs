@@ -3,7 +3,7 @@
 //! One straight line, no way back:
 //!
 //! ```text
-//! bytes -> Bundle -> keys in caller's memory -> time -> cell -> coverage -> span -> texel -> row of pixels
+//! bytes -> Bundle -> keys in caller's memory -> time -> space -> coverage -> span -> texel -> row of pixels
 //! ```
 //!
 //! - [`Bundle::parse`] checks the bytes once; afterwards every accessor is total.

@@ -1,5 +1,5 @@
 //! The sheets of a row of cells at one moment: where each one's corners are, and how it bends between them.
-//! Rows of nodes come from `row`, sheet lists from the caller's memory; spans go to `span`.
+//! Rows of nodes come from `row`, sheet lists from the caller's memory; `site` and those above it draw by them.
 
 use crate::grid::Grid;
 use crate::lists::Lists;

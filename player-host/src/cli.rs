@@ -43,7 +43,7 @@ pub struct Show {
     #[arg(long)]
     pub headless: bool,
     /// Writes what the window shows at picture N (--frames, else the first) as a PNG, then exits.
-    #[arg(long, value_name = "FILE.png")]
+    #[arg(long, value_name = "FILE.png", value_parser = picture)]
     pub shot: Option<PathBuf>,
     /// Shows N pictures, one frame after the other, then exits.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
@@ -54,6 +54,13 @@ pub struct Show {
     /// The window opens with N screen pixels to a pixel of the picture; left out: as many as fit the screen.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=16))]
     pub scale: Option<u32>,
+}
+
+/// The name of a picture that can be written.
+fn picture(name: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(name);
+    let png = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
+    if png { Ok(path) } else { Err("a PNG is written: expected FILE.png".to_owned()) }
 }
 
 /// The commands that need no window.
@@ -86,7 +93,7 @@ pub struct Render {
     /// Every pixel becomes a square of N x N.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=16))]
     pub scale: u32,
-    /// Antialiases outlines: four samples a pixel where surfaces meet, as the player's `smooth_row` does; such pixels take four times as long.
+    /// Antialiases outlines: four samples a pixel where surfaces meet, as the player's `smooth_row` does; such pixels take many times as long.
     #[arg(long)]
     pub smooth: bool,
     /// How texels become pixels [default: nearest].

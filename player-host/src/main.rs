@@ -58,17 +58,15 @@ fn show(args: &Show) -> Result<()> {
     if let (Some(shot), Some(bundle)) = (&args.shot, &args.input) {
         input::keep(bundle, "--shot", shot)?;
     }
-    let events = if args.headless {
-        None
-    } else {
-        window::connect()
-            .inspect_err(|reason| {
+    let events = if args.headless { None } else { Some(window::connect()) };
+    with_player(args.input.as_deref(), |loaded, bundle, mut player| {
+        let events = events.and_then(|events| {
+            let told = events.inspect_err(|reason| {
                 let instead = args.shot.as_deref().unwrap_or(&args.out).display();
                 tell(format_args!("No display ({reason}): writing files instead of opening a window: {instead}"));
-            })
-            .ok()
-    };
-    with_player(args.input.as_deref(), |loaded, bundle, mut player| {
+            });
+            told.ok()
+        });
         let mut rows = measure::facts(loaded, bundle);
         rows.extend(loaded.rows.iter().cloned());
         print(&(measure::table(&rows) + "\n"))?;

@@ -46,7 +46,7 @@ pub fn run(loaded: &Loaded, bundle: &Bundle<'_>, player: &mut Player<'_>, as_jso
     let (width, height) = bundle.size();
     let frames = bundle.frames();
     let mut picture = Picture::new(width, height);
-    // A new player holds the first keys already: starting from the end, frame 0 is charged for them like any other.
+    // As in playback that goes on: in a loop frame 0 finds there what the last one has left; elsewhere it decodes from the first key on, as in a new player.
     player.seek(Frame(frames - 1));
     let mut spreads = [Spread::default(); COUNTERS.len()];
     let bar = progress(frames.into(), "frames");

@@ -74,7 +74,7 @@ pub fn psnr(squares: u64, values: usize) -> f64 {
     if squares == 0 { 99.0 } else { (10.0 * (255.0 * 255.0 * values as f64 / squares as f64).log10()).min(99.0) }
 }
 
-/// Bytes of the keys of a bundle, records and table, over its frames.
+/// Bytes of the keys of a bundle, records, table, planes and cameras, over its frames.
 ///
 /// # Errors
 /// The bundle does not parse.

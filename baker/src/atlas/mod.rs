@@ -225,7 +225,9 @@ pub struct Atlas {
 }
 
 /// Cuts what the hits see into charts, packs and colours them. `progress` hears (steps done, steps in all).
-/// Fails if the settings are out of range or there are more charts than room.
+///
+/// # Errors
+/// [`AtlasError`] where the settings are out of range, or there are more charts than room.
 pub fn build(scene: &Scene, hits: &Hits, settings: &Settings, progress: &(dyn Fn(u64, u64) + Sync)) -> Result<Atlas, AtlasError> {
     progress(0, 4);
     of_charts(scene, hits, charts(scene, hits, settings)?, settings, progress)
