@@ -44,7 +44,7 @@ pub enum BakeError {
     },
     /// Even the smallest bundle that a search found is too large.
     #[error(
-        "--budget: expected room for {smallest} bytes, the smallest bundle of this scene, found {budget}; raise it, or lower --size or --frames"
+        "--budget: expected room for about {smallest} bytes, as the smallest bundle that was tried takes, found {budget}; raise it, or lower --size or --frames"
     )]
     Budget {
         /// Bytes allowed.

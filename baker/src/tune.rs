@@ -18,8 +18,11 @@ use std::time::Instant;
 
 /// Cells tried at first, pixels.
 const CELLS: [u32; 2] = [16, 8];
-/// Key intervals tried at first, frames.
+/// Key intervals tried at first, frames,
 const INTERVALS: [u32; 4] = [32, 16, 8, 4];
+/// and those on paths of at most so many frames: whatever interval is asked for, they have keys at their ends and where they turn quickly, and no step to one
+/// a little shorter shows what a key a frame would bring.
+const SHORT: (u32, [u32; 2]) = (32, [2, 1]);
 /// What a bit is worth at first in the search for a budget.
 const BUDGET_LAMBDA: f32 = 0.1;
 /// Densities of the source image tried, of the one asked for; in a search for a budget after that with all its detail, where that is left open.
@@ -142,7 +145,9 @@ impl Search<'_> {
     fn grids(&self, source: atlas::Settings) -> Vec<Settings> {
         let base = Settings { atlas: source, ..self.options.settings(self.scene.playback.width) };
         let cells = self.options.cell.map_or(CELLS.to_vec(), |cell| vec![cell]);
-        let shorter: Vec<u32> = INTERVALS.into_iter().filter(|&interval| interval < self.scene.playback.frames).collect();
+        let frames = self.scene.playback.frames;
+        let shortest = SHORT.1.into_iter().filter(|_| frames <= SHORT.0);
+        let shorter: Vec<u32> = INTERVALS.into_iter().chain(shortest).filter(|&interval| interval < frames).collect();
         let intervals = match self.options.key_interval {
             Some(interval) => vec![interval],
             None if shorter.is_empty() => vec![base.key_interval],
@@ -161,7 +166,7 @@ impl Search<'_> {
     ///
     /// Source images and grids are measured apart, then the sums of their bytes and of their errors say which pairs to bake.
     fn budget(&self, budget: u64) -> Result<Chosen, BakeError> {
-        let steps = IMAGES + INTERVALS.len() * CELLS.len() + TRIES + STEPS;
+        let steps = IMAGES + self.grids(self.options.source()).len() + TRIES + STEPS;
         let samples = Samples::new(self.cast);
         let room = usize::try_from(budget).unwrap_or(usize::MAX);
         let mut images: Vec<Image> = Vec::new();
@@ -311,7 +316,7 @@ impl Search<'_> {
     /// The smallest bundle whose mean PSNR against exact rays reaches `asked`.
     fn psnr(&self, asked: f64) -> Result<Chosen, BakeError> {
         let mut source = self.options.source();
-        let steps = CELLS.len() * INTERVALS.len() + STEPS;
+        let steps = self.grids(source).len() + STEPS;
         let (mut step, mut nearest, mut room, mut exceeded) = (0, 0.0f64, MOST_MEMORY, None);
         // Of bundles that reach it the smaller one counts, of those that do not the better one.
         let mut score = |flat: &Flat, settings: &Settings, first: bool| -> Result<Option<f64>, BakeError> {
