@@ -147,7 +147,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
         }
         for mixed in self.mixed() {
             let Some(pixels) = pixels(mixed.block.into(), out, log2) else { break };
-            block(&self.site, *mixed, y, pixels, paint, None);
+            block(&self.site, *mixed, y, [pixels], paint, [None]);
         }
     }
 
@@ -200,15 +200,12 @@ impl<'d, 'a> Drawing<'d, 'a> {
             let Some(pixels) = pixels(mixed.block.into(), out, log2) else { break };
             // One sheet has no outlines here: it is only that its positions fit no window.
             if mixed.sheets.is_power_of_two() {
-                block(&self.site, *mixed, y, pixels, paint, None);
+                block(&self.site, *mixed, y, [pixels], paint, [None]);
                 continue;
             }
             let mut samples = [[P::Pixel::default(); 1 << BLOCK_LOG2]; 4];
-            for (samples, beside) in samples.iter_mut().zip([[-1, -1], [1, -1], [-1, 1], [1, 1]]) {
-                if let Some(samples) = samples.get_mut(..pixels.len()) {
-                    block(&self.site, *mixed, y, samples, paint, Some(beside));
-                }
-            }
+            let each = samples.each_mut().map(|samples| samples.get_mut(..pixels.len()).unwrap_or(&mut []));
+            block(&self.site, *mixed, y, each, paint, [[-1, -1], [1, -1], [-1, 1], [1, 1]].map(Some));
             let [a, b, c, d] = &samples;
             let samples = a.iter().zip(b).zip(c.iter().zip(d));
             for (pixel, ((&a, &b), (&c, &d))) in pixels.iter_mut().zip(samples) {
@@ -252,19 +249,26 @@ fn cut<P: Paint>(paint: &P, tiles: &Tiles<'_>, out: &mut [P::Pixel], width_log2:
     out.iter_mut().zip(made).for_each(|(pixel, made)| *pixel = made);
 }
 
-/// One mixed block, front to back: the frontmost sheet that covers a pixel shows; at pixels' centres, or `beside` them, quarters of a
-/// pixel across and down.
+/// One mixed block, front to back: the frontmost sheet that covers a pixel shows; for every line of `pixels` at their centres, or `beside` them, quarters
+/// of a pixel across and down. What is the same for all lines is worked out once.
 #[inline(never)]
-fn block<P: Paint>(site: &Site<'_, '_, '_>, mixed: Mixed, y: u32, pixels: &mut [P::Pixel], paint: &P, beside: Option<[i32; 2]>) {
+fn block<P: Paint, const LINES: usize>(
+    site: &Site<'_, '_, '_>,
+    mixed: Mixed,
+    y: u32,
+    mut pixels: [&mut [P::Pixel]; LINES],
+    paint: &P,
+    beside: [Option<[i32; 2]>; LINES],
+) {
     let log2 = site.block_log2();
     let [left_of, above] = site.offset(mixed.block.into(), y >> log2);
     let row = y & (1u32 << log2).wrapping_sub(1);
     let offset = [left_of, above.wrapping_add(row)];
-    let (texture, wide) = (site.texture, pixels.len() as u32);
-    let beside = |form: Form| beside.map_or(form, |beside| form.beside(beside));
-    let mut left = u32::MAX.wrapping_shr(32u32.wrapping_sub(wide));
+    let (texture, wide) = (site.texture, pixels.first().map_or(0, |line| line.len() as u32));
+    let moved = |form: Form, beside: Option<[i32; 2]>| beside.map_or(form, |beside| form.beside(beside));
+    let mut left = [u32::MAX.wrapping_shr(32u32.wrapping_sub(wide)); LINES];
     let mut sheets = mixed.sheets;
-    while sheets != 0 && left != 0 {
+    while sheets != 0 && left != [0; LINES] {
         let place = usize::from(mixed.sheet).wrapping_add(sheets.trailing_zeros() as usize);
         sheets &= sheets.wrapping_sub(1);
         let Some(sheet) = site.sheets.sheet.get(place).map(|sheet| sheet.further(mixed.along)) else { break };
@@ -274,26 +278,34 @@ fn block<P: Paint>(site: &Site<'_, '_, '_>, mixed: Mixed, y: u32, pixels: &mut [
         let tested = sheets != 0;
         if tested && sheet.test() != CHART {
             for which in chart.fields() {
+                let field = site.field(sheet, which, offset);
                 // Below zero where the field is above.
-                shown &= beside(site.field(sheet, which, offset)).negated().negative(wide);
+                for (shown, beside) in shown.iter_mut().zip(beside) {
+                    *shown &= moved(field, beside).negated().negative(wide);
+                }
             }
         }
-        if shown == 0 {
+        if shown == [0; LINES] {
             continue;
         }
-        let forms = site.forms(sheet, offset).map(beside);
-        if tested && sheet.test() != FIELD {
-            shown = span::inside(&chart, shown, wide, &forms, texture);
-        }
-        if shown != 0 {
-            span::paint(pixels, shown, Straight::new(&forms, row, log2), texture, |uv, x| paint.at(uv, sheet.label(), x));
-            left &= !shown;
+        let forms = site.forms(sheet, offset);
+        for ((line, left), (mut shown, beside)) in pixels.iter_mut().zip(&mut left).zip(shown.into_iter().zip(beside)) {
+            let forms = forms.map(|form| moved(form, beside));
+            if tested && sheet.test() != FIELD && shown != 0 {
+                shown = span::inside(&chart, shown, wide, &forms, texture);
+            }
+            if shown != 0 {
+                span::paint(line, shown, Straight::new(&forms, row, log2), texture, |uv, x| paint.at(uv, sheet.label(), x));
+                *left &= !shown;
+            }
         }
     }
     // Only a broken bundle has a cell without sheets.
-    for (index, pixel) in pixels.iter_mut().enumerate().filter(|_| left != 0) {
-        if left.wrapping_shr(index as u32) & 1 != 0 {
-            *pixel = P::Pixel::default();
+    for (line, left) in pixels.into_iter().zip(left).filter(|&(_, left)| left != 0) {
+        for (index, pixel) in line.iter_mut().enumerate() {
+            if left.wrapping_shr(index as u32) & 1 != 0 {
+                *pixel = P::Pixel::default();
+            }
         }
     }
 }

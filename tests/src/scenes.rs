@@ -57,7 +57,7 @@ pub fn raw_and_packed(scene: &Scene, settings: &Settings) -> Result<(Flat, [Vec<
     Ok((flat, [raw.bundle, packed.bundle]))
 }
 
-/// Like [`bake`], its texels coloured by what is played.
+/// Like [`bake()`], its texels coloured by what is played.
 ///
 /// # Errors
 /// Those of the baker, with the scene's name.
