@@ -29,7 +29,11 @@ pub(super) fn read(name: &Path, folder: &Path, trouble: &mut Trouble) -> tobj::M
             }
         }
     }
-    tobj::load_mtl_buf(&mut lines.as_bytes())
+    tobj::load_mtl_buf(&mut lines.as_bytes()).or_else(|e| {
+        trouble.told.push(format!("material libraries: {e}: all materials are left white"));
+        trouble.lost = true;
+        Ok(Default::default())
+    })
 }
 
 /// Appends the lines of `text` that are shown to `lines`; anything else in it may be as odd as it likes.
@@ -40,6 +44,11 @@ fn clean(text: &str, library: &str, lines: &mut String, told: &mut Vec<String>) 
         let rest = rest.trim();
         let numbers = rest.split_whitespace().map(|word| word.parse::<f32>().ok().filter(|v| v.is_finite())).collect::<Option<Vec<_>>>();
         let shown = match (word, numbers.as_deref()) {
+            // What follows is about it, not about the one before.
+            ("newmtl", _) if rest.is_empty() => {
+                lines.push_str("newmtl (no name)\n");
+                Err("a name after it")
+            }
             ("newmtl", _) => Ok(line.to_owned()),
             // One number is grey.
             ("Kd" | "Ke", Some(&[grey])) => Ok(format!("{word} {grey} {grey} {grey}")),
@@ -111,13 +120,13 @@ mod tests {
 
     #[test]
     fn lines_that_cannot_be_read_leave_the_others() {
-        let text = "newmtl a\nKd 0.5\nKd 1 2\nKd xyz 0.1 0.2 0.3\nKe 1,0 0 0\nd -halo 0.3\nd\nNs many\nmap_Kd\nmap_Kd -clamp on a.png\nKd 0.1 0.2 0.3 9";
+        let text = "newmtl\nKd 1 1 1\nnewmtl a\nKd 0.5\nKd 1 2\nKd xyz 0.1 0.2 0.3\nKe 1,0 0 0\nd -halo 0.3\nd\nNs many\nmap_Kd\nmap_Kd -clamp on a.png\nKd 0.1 0.2 0.3 9";
         let (mut lines, mut told) = (String::new(), Vec::new());
         clean(text, "library", &mut lines, &mut told);
-        assert_eq!(lines, "newmtl a\nKd 0.5 0.5 0.5\nd 0.3\nmap_Kd -clamp on a.png\nKd 0.1 0.2 0.3\n");
+        assert_eq!(lines, "newmtl (no name)\nKd 1 1 1\nnewmtl a\nKd 0.5 0.5 0.5\nd 0.3\nmap_Kd -clamp on a.png\nKd 0.1 0.2 0.3\n");
         let places: Vec<&str> = told.iter().map(|t| t.split(": ").nth(1).unwrap()).collect();
-        assert_eq!(places, ["line 3", "line 4", "line 5", "line 7", "line 9", "line 10"]);
-        assert_eq!(tobj::load_mtl_buf(&mut lines.as_bytes()).unwrap().0[0].diffuse, Some([0.1, 0.2, 0.3]));
+        assert_eq!(places, ["line 1", "line 5", "line 6", "line 7", "line 9", "line 11", "line 12"]);
+        assert_eq!(tobj::load_mtl_buf(&mut lines.as_bytes()).unwrap().0[1].diffuse, Some([0.1, 0.2, 0.3]));
     }
 
     #[test]
