@@ -142,8 +142,8 @@ impl<'a, T: Texels> Player<'a, T> {
     }
 
     /// Like [`Player::row`], with antialiased outlines: where a block of pixels shows more than one sheet, every pixel is the mean of four,
-    /// a quarter of a pixel off its centre both ways. On a Cortex-M4 a pixel of
-    /// such a block takes some 410 instructions more than in `row`; all others take the same.
+    /// a quarter of a pixel off its centre both ways. On a Cortex-M4 a pixel of such a block takes some 410 instructions more than in `row`; all others
+    /// take the same.
     #[inline]
     pub fn smooth_row(&mut self, y: u32, out: &mut [u16]) {
         T::smooth_row(&mut self.playing, y, out);

@@ -61,7 +61,7 @@ pub fn raw_and_packed(scene: &Scene, settings: &Settings) -> Result<(Flat, [Vec<
 ///
 /// # Errors
 /// Those of the baker, with the scene's name.
-pub fn painted(scene: &Scene, settings: &Settings) -> Result<(Flat, Encoded)> {
+fn painted(scene: &Scene, settings: &Settings) -> Result<(Flat, Encoded)> {
     let (mut flat, mut encoded) = bake(scene, settings)?;
     let painter = Painter::new(&Cast::new(scene, &|_, _| {}), &|_, _| {});
     let painted = painter.painted(&encoded.bundle, &flat.atlas.image, &settings.atlas).with_context(|| format!("paint {}", scene.name))?;
@@ -74,7 +74,7 @@ pub fn painted(scene: &Scene, settings: &Settings) -> Result<(Flat, Encoded)> {
 /// The bytes of the bundle of the built-in scene `name` at `size` and `frames`.
 ///
 /// # Errors
-/// Those of [`reduced`] and [`painted`].
+/// Those of [`reduced`], and the baker's.
 pub fn bundle(name: &str, size: [u32; 2], frames: u32, settings: &Settings) -> Result<Vec<u8>> {
     Ok(painted(&reduced(name, size, frames)?, settings)?.1.bundle)
 }

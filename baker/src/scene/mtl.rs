@@ -42,6 +42,7 @@ fn clean(text: &str, library: &str, lines: &mut String, told: &mut Vec<String>) 
         let line = line.trim();
         let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         let rest = rest.trim();
+        let place = || format!("{library}: line {}: \"{line}\"", number + 1);
         let numbers = rest.split_whitespace().map(|word| word.parse::<f32>().ok().filter(|v| v.is_finite())).collect::<Option<Vec<_>>>();
         let shown = match (word, numbers.as_deref()) {
             // What follows is about it, not about the one before.
@@ -62,10 +63,7 @@ fn clean(text: &str, library: &str, lines: &mut String, told: &mut Vec<String>) 
             ("map_Kd" | "map_d", _) if rest.is_empty() => Err("the name of a picture"),
             ("map_Kd" | "map_d", _) => {
                 if moves(rest) {
-                    told.push(format!(
-                        "{library}: line {}: \"{line}\": its options are not supported: the picture is taken as it is",
-                        number + 1
-                    ));
+                    told.push(format!("{}: its options are not supported: the picture is taken as it is", place()));
                 }
                 Ok(line.to_owned())
             }
@@ -73,7 +71,7 @@ fn clean(text: &str, library: &str, lines: &mut String, told: &mut Vec<String>) 
         };
         match shown {
             Ok(line) => lines.extend([&line, "\n"]),
-            Err(expected) => told.push(format!("{library}: line {}: \"{line}\": expected {expected}: left out", number + 1)),
+            Err(expected) => told.push(format!("{}: expected {expected}: left out", place())),
         }
     }
 }

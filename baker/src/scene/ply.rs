@@ -192,6 +192,11 @@ fn model(bytes: &[u8], folder: &Path, fallback: Option<&Path>) -> Result<Model, 
         if corners.len() < 3 {
             model.warnings.add("faces of fewer than three corners are not shown");
         }
+        // Most faces are triangles.
+        if let &[a, b, c] = &corners[..] {
+            push(&mut model, [a, b, c], &vertices)?;
+            continue;
+        }
         let positions: Vec<DVec3> = corners.iter().map(|&corner| vertices[corner].position).collect();
         for triangle in polygon::triangles(&positions) {
             push(&mut model, triangle.map(|at| corners[at]), &vertices)?;

@@ -1,7 +1,7 @@
 //! The table of source images: what each scene was cut into, how tightly that is packed, why cells are torn, and what it all costs beside
 //! codecs of single frames. Scenes come from the command `table`, figures from the baker's report; the table goes back.
 
-use super::{Table, markdown, number};
+use super::{Table, baked, markdown, number};
 use crate::codecs::clip::{self, Shape};
 use crate::codecs::ffmpeg::Ffmpeg;
 use crate::codecs::search::Match;
@@ -9,7 +9,7 @@ use crate::codecs::{Codec, Metric, Source};
 use anyhow::{Context, Result};
 use cubist_baker::atlas::{SourceImage, Storage};
 use cubist_baker::encode::image_bytes;
-use cubist_baker::job::{self, Baked, Options};
+use cubist_baker::job::{Baked, Options};
 use cubist_baker::scene::Scene;
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
@@ -48,8 +48,7 @@ const COLUMNS: [(&str, &str, usize); 21] = [
 /// # Errors
 /// The baker's, those of temporary files, and what ffmpeg says.
 pub fn measure(scene: &Scene, ffmpeg: Option<&Ffmpeg>) -> Result<Value> {
-    eprintln!("{}: baking", scene.name);
-    let baked = job::run(scene, &Options::default(), &|_, _| {}).with_context(|| format!("bake {}", scene.name))?;
+    let baked = baked(scene, &Options::default())?;
     let mut row = own(&baked)?;
     eprintln!("{}: comparing with codecs", scene.name);
     let shape = Shape::of(scene);

@@ -1,9 +1,9 @@
 //! The table of scenes: what each costs and how well it plays, at its own playback, as `cubist-bake` bakes it without options.
 //! Scenes come from the command `table`, figures from the baker's report; the table goes back.
 
-use super::{Table, markdown, number};
+use super::{Table, baked, markdown, number};
 use anyhow::{Context, Result, bail};
-use cubist_baker::job::{self, Baked, Options};
+use cubist_baker::job::{Baked, Options};
 use cubist_baker::scene::Scene;
 use cubist_baker::{Report, TruthFrames};
 use cubist_core::Bundle;
@@ -35,9 +35,7 @@ const COLUMNS: [(&str, &str, usize); 16] = [
 /// # Errors
 /// The baker's.
 pub fn measure(scene: &Scene) -> Result<Value> {
-    eprintln!("{}: baking", scene.name);
-    let options = Options { truth: TruthFrames::None, ..Options::default() };
-    let Baked { bundle, report, .. } = job::run(scene, &options, &|_, _| {}).with_context(|| format!("bake {}", scene.name))?;
+    let Baked { bundle, report, .. } = baked(scene, &Options { truth: TruthFrames::None, ..Options::default() })?;
     let bundle = Bundle::parse(&bundle).with_context(|| format!("parse the bundle of {}", scene.name))?;
     let atlas = bundle.atlas();
     let Report { grid, quality, work, .. } = &report;

@@ -2,7 +2,7 @@
 //! rays, and against the antialiased truth, rows drawn plainly or as finely as the player can. Scenes come from the command `table`, codecs from
 //! `crate::codecs`.
 
-use super::{Table, markdown, number};
+use super::{Table, baked, markdown, number};
 use crate::codecs::clip::{self, Likeness, Shape};
 use crate::codecs::ffmpeg::Ffmpeg;
 use crate::codecs::search::Match;
@@ -11,7 +11,7 @@ use anyhow::{Context, Result};
 use cubist_baker::TruthFrames;
 use cubist_baker::atlas::Storage;
 use cubist_baker::bake::Settings;
-use cubist_baker::job::{self, Baked, Options};
+use cubist_baker::job::{Baked, Options};
 use cubist_baker::scene::Scene;
 use rayon::prelude::*;
 use serde_json::{Value, json};
@@ -63,9 +63,8 @@ struct Ours {
 /// # Errors
 /// The baker's, those of temporary files, and what ffmpeg says.
 pub fn measure(scene: &Scene, ffmpeg: Option<&Ffmpeg>) -> Result<Vec<Value>> {
-    eprintln!("{}: baking", scene.name);
     let options = Options { storage: Some(Storage::Packed), truth: TruthFrames::None, ..Options::default() };
-    let Baked { bundle, report, flat, .. } = job::run(scene, &options, &|_, _| {}).with_context(|| format!("bake {}", scene.name))?;
+    let Baked { bundle, report, flat, .. } = baked(scene, &options)?;
     eprintln!("{}: rendering the truth", scene.name);
     let shape = Shape::of(scene);
     let folder = tempfile::tempdir().context("make a temporary folder")?;

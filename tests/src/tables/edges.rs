@@ -1,11 +1,11 @@
 //! The table of antialiased outlines: what four samples a pixel where surfaces meet are worth, and what they cost.
 //! Scenes come from the command `table`; every picture is compared with the antialiased scene itself.
 
-use super::{Table, markdown, number};
+use super::{Table, baked, markdown, number};
 use crate::play;
-use anyhow::{Context, Result};
+use anyhow::Result;
 use cubist_baker::TruthFrames;
-use cubist_baker::job::{self, Baked, Options};
+use cubist_baker::job::{Baked, Options};
 use cubist_baker::metrics;
 use cubist_baker::scene::Scene;
 use cubist_baker::truth::{Truth, spread};
@@ -32,9 +32,7 @@ struct Drawn {
 /// # Errors
 /// The baker's.
 pub fn measure(scene: &Scene) -> Result<Value> {
-    eprintln!("{}: baking", scene.name);
-    let options = Options { truth: TruthFrames::None, ..Options::default() };
-    let Baked { bundle, .. } = job::run(scene, &options, &|_, _| {}).with_context(|| format!("bake {}", scene.name))?;
+    let Baked { bundle, .. } = baked(scene, &Options { truth: TruthFrames::None, ..Options::default() })?;
     eprintln!("{}: comparing", scene.name);
     let truth = Truth::new(scene);
     let frames = spread(scene.playback.frames, COMPARED);

@@ -9,7 +9,8 @@ pub mod document;
 pub mod edges;
 pub mod hard;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
+use cubist_baker::job::{self, Baked, Options};
 use cubist_baker::scene::{Overrides, Scene, load, load_builtin};
 use serde_json::Value;
 use std::path::Path;
@@ -35,6 +36,15 @@ pub fn markdown(titles: &[&str], text: usize, rows: &[Vec<String>]) -> String {
 /// A number with that many digits after the point; nothing for what is not there.
 fn number(value: &Value, digits: usize) -> String {
     value.as_f64().map_or_else(String::new, |value| format!("{value:.digits$}"))
+}
+
+/// `scene` as `cubist-bake` bakes it with `options`.
+///
+/// # Errors
+/// The baker's, with the scene's name.
+fn baked(scene: &Scene, options: &Options) -> Result<Baked> {
+    eprintln!("{}: baking", scene.name);
+    job::run(scene, options, &|_, _| {}).with_context(|| format!("bake {}", scene.name))
 }
 
 /// The scene that `name` means: a built-in one, or a file where it looks like one.
