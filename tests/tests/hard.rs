@@ -91,12 +91,12 @@ fn hits(baked: &Baked, mut visit: impl FnMut(&Lens, [u32; 2], Option<u32>)) {
 }
 
 /// Bakes the case `name` and holds it to all of the above; gives it for what is special about it.
-fn check(name: &str, psnr_min: f64, wrong_percent: f64, off_texels: f64) -> (Baked, Figures) {
+fn check(name: &str, psnr_min: f64, wrong_percent: f64, off_texels: f64) -> (&'static Baked, Figures) {
     let case = hard::case(name).expect("there is such a case");
-    let baked = case.bake().expect("it bakes");
+    let baked = case.baked().expect("it bakes");
     let figures = hard::measure(&baked.encoded.bundle, &baked.flat.atlas).expect("it plays");
     println!("{name}: {} bytes, {figures:?}", baked.encoded.bundle.len());
-    rays_are_exact(&baked);
+    rays_are_exact(baked);
     integers_are_exact(&baked.encoded.bundle);
     let good =
         figures.psnr_min >= psnr_min && figures.wrong_surface_percent <= wrong_percent && figures.position_error_texels <= off_texels;
@@ -116,7 +116,7 @@ macro_rules! cases {
             fn $name() {
                 let checked = check(stringify!($name), $psnr, $wrong, $off);
                 let also: &[fn(&Baked, &Figures)] = &[$($also)?];
-                also.iter().for_each(|also| also(&checked.0, &checked.1));
+                also.iter().for_each(|also| also(checked.0, &checked.1));
             }
         )*
 
@@ -201,7 +201,7 @@ fn the_lowest_face_wins(baked: &Baked, _: &Figures) {
 
 /// Figures are those of the same scene in numbers near one.
 fn as_good_as_at_home(_: &Baked, figures: &Figures) {
-    let home = hard::case("town").expect("there is a town").bake().expect("it bakes");
+    let home = hard::case("town").expect("there is a town").baked().expect("it bakes");
     let home = hard::measure(&home.encoded.bundle, &home.flat.atlas).expect("it plays");
     assert!((figures.psnr_mean - home.psnr_mean).abs() < 0.35, "{figures:?}, at home {home:?}");
     assert!((figures.wrong_surface_percent - home.wrong_surface_percent).abs() < 0.1, "{figures:?}, at home {home:?}");

@@ -1,6 +1,7 @@
 //! Packed source images: what a bundle that holds one plays, and what memory it takes, against the same scene's with a raw one.
 //! Scenes come from `scenes`, baked both ways; real pictures go through the packer and back.
 
+use cubist_baker::atlas::Storage;
 use cubist_baker::bake::{Flat, Settings};
 use cubist_baker::encode;
 use cubist_baker::inspect::Inspection;
@@ -15,15 +16,17 @@ const SCENES: [&str; 2] = ["street", "terrain"];
 
 /// A scene baked raw and packed.
 fn both(name: &str) -> (Flat, [Vec<u8>; 2]) {
-    both_of(name, TexelKind::Indexed8, None)
+    let scene = scenes::reduced(name, SIZE, FRAMES).expect("a built-in scene");
+    scenes::raw_and_packed(&scene, &Settings::default()).expect("it bakes")
 }
 
-/// A scene baked raw and packed, with texels of `kind` and 2^`outline` bits of outline a texel.
-fn both_of(name: &str, kind: TexelKind, outline: Option<u32>) -> (Flat, [Vec<u8>; 2]) {
-    let scene = scenes::reduced(name, SIZE, FRAMES).expect("a built-in scene");
+/// A scene baked packed, with texels of `kind` and 2^`outline` bits of outline a texel. Of a few frames: it is about the picture.
+fn packed_of(name: &str, kind: TexelKind, outline: u32) -> (Flat, Vec<u8>) {
+    let scene = scenes::reduced(name, SIZE, 3).expect("a built-in scene");
     let mut settings = Settings::default();
-    (settings.atlas.texels, settings.atlas.outline) = (kind, outline);
-    scenes::raw_and_packed(&scene, &settings).expect("it bakes")
+    (settings.atlas.texels, settings.atlas.outline, settings.atlas.storage) = (kind, Some(outline), Storage::Packed);
+    let (flat, encoded) = scenes::bake(&scene, &settings).expect("it bakes");
+    (flat, encoded.bundle)
 }
 
 /// The texels of a source image, a byte each.
@@ -60,7 +63,7 @@ fn packed_plays_the_pixels_of_raw() {
 #[test]
 fn the_document_says_how_to_unpack() {
     for (name, finer) in SCENES.into_iter().flat_map(|name| [0, 1, 2].map(|finer| (name, finer))) {
-        let (flat, [_, packed]) = both_of(name, TexelKind::Indexed8, Some(finer));
+        let (flat, packed) = packed_of(name, TexelKind::Indexed8, finer);
         let bundle = Bundle::parse(&packed).expect("packed");
         let (width, height) = (flat.atlas.image.width as i32, flat.atlas.image.height as i32);
         let bytes = bundle.packed().expect("it is packed");
@@ -75,7 +78,7 @@ fn the_document_says_how_to_unpack() {
 #[test]
 fn the_document_says_how_to_unpack_texels_that_are_no_bytes() {
     for kind in [TexelKind::Indexed4, TexelKind::Direct565] {
-        let (flat, [_, packed]) = both_of("street", kind, Some(1));
+        let (flat, packed) = packed_of("street", kind, 1);
         let image = &flat.atlas.image;
         let (width, height) = (image.width as i32, image.height as i32);
         let bundle = Bundle::parse(&packed).expect("packed");

@@ -10,13 +10,14 @@ pub mod rays;
 mod sheets;
 
 use crate::{figures, play, scenes};
-use anyhow::Result;
+use anyhow::{Context, Result};
 use cubist_baker::atlas::Atlas;
 use cubist_baker::bake::{Encoded, Flat, Settings};
 use cubist_baker::chart::Family;
 use cubist_baker::scene::Scene;
 use cubist_core::Bundle;
 use serde::{Deserialize, Serialize};
+use std::sync::OnceLock;
 
 /// Side of the cells that the worst one is looked for among, pixels.
 const CELL: usize = 8;
@@ -108,14 +109,20 @@ impl Case {
         settings
     }
 
-    /// Bakes the case.
+    /// Bakes the case, the first time that it is asked for.
     ///
     /// # Errors
     /// The baker's.
-    pub fn bake(&self) -> Result<Baked> {
+    pub fn baked(&self) -> Result<&'static Baked> {
+        static KNOWN: [OnceLock<Baked>; CASES.len()] = [const { OnceLock::new() }; CASES.len()];
+        let known = CASES.iter().position(|case| case.name == self.name).and_then(|at| KNOWN.get(at)).context("no case of this name")?;
+        if let Some(baked) = known.get() {
+            return Ok(baked);
+        }
+        // Not within the lock: who waits for it may be a thread that baking needs.
         let scene = (self.scene)();
         let (flat, encoded) = scenes::bake(&scene, &self.settings())?;
-        Ok(Baked { scene, flat, encoded })
+        Ok(known.get_or_init(|| Baked { scene, flat, encoded }))
     }
 }
 

@@ -25,7 +25,7 @@ const COLUMNS: [(&str, &str, usize); 7] = [
 /// The baker's, with the scene's name.
 pub fn measure_all() -> Result<Baseline> {
     let of = |case: &crate::hard::Case| -> Result<(String, Figures)> {
-        let baked = case.bake()?;
+        let baked = case.baked()?;
         let figures = measure(&baked.encoded.bundle, &baked.flat.atlas).with_context(|| format!("play {}", case.name))?;
         Ok((case.name.to_owned(), figures))
     };
