@@ -25,6 +25,9 @@ pub trait Paint {
     /// Its code is so short that loops over a few pixels are written out.
     const SHORT: bool;
 
+    /// Pixels are means of what is around them already: one whose samples all show one sheet is made once, at its centre.
+    const ONCE: bool;
+
     /// The pixel at `uv`, which is inside the picture; `x`: whether it is an odd one of its row.
     fn at(&self, uv: PlayUv, label: u8, x: usize) -> Self::Pixel;
 
@@ -44,6 +47,7 @@ impl Paint for Probes {
     type Pixel = Probe;
     const REACH: i32 = 0;
     const SHORT: bool = false;
+    const ONCE: bool = false;
 
     fn at(&self, uv: PlayUv, label: u8, _: usize) -> Probe {
         Probe { label, at: uv }
@@ -147,7 +151,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
         }
         for mixed in self.mixed() {
             let Some(pixels) = pixels(mixed.block.into(), out, log2) else { break };
-            block(&self.site, *mixed, y, [pixels], paint, [None]);
+            block(&self.site, *mixed, y, [pixels], paint, [None], &mut []);
         }
     }
 
@@ -192,7 +196,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
     }
 
     /// Draws pixel row `y` like [`Drawing::row`], but every pixel of a mixed block as `mean` has it of four, a quarter of a pixel off its
-    /// centre both ways.
+    /// centre both ways; or, as [`Paint::ONCE`] has it, those alone of which the four show more than one sheet.
     pub fn smooth<P: Paint>(&mut self, y: u32, out: &mut [P::Pixel], work: &mut Work, paint: &P, mean: impl Fn([P::Pixel; 4]) -> P::Pixel) {
         let log2 = self.site.block_log2();
         let out = self.tiles(y, out, work, paint, true);
@@ -200,16 +204,18 @@ impl<'d, 'a> Drawing<'d, 'a> {
             let Some(pixels) = pixels(mixed.block.into(), out, log2) else { break };
             // One sheet has no outlines here: it is only that its positions fit no window.
             if mixed.sheets.is_power_of_two() {
-                block(&self.site, *mixed, y, [pixels], paint, [None]);
+                block(&self.site, *mixed, y, [pixels], paint, [None], &mut []);
                 continue;
             }
             let mut samples = [[P::Pixel::default(); 1 << BLOCK_LOG2]; 4];
             let each = samples.each_mut().map(|samples| samples.get_mut(..pixels.len()).unwrap_or(&mut []));
-            block(&self.site, *mixed, y, each, paint, [[-1, -1], [1, -1], [-1, 1], [1, 1]].map(Some));
+            let made = block(&self.site, *mixed, y, each, paint, [[-1, -1], [1, -1], [-1, 1], [1, 1]].map(Some), pixels);
             let [a, b, c, d] = &samples;
             let samples = a.iter().zip(b).zip(c.iter().zip(d));
-            for (pixel, ((&a, &b), (&c, &d))) in pixels.iter_mut().zip(samples) {
-                *pixel = mean([a, b, c, d]);
+            for (x, (pixel, ((&a, &b), (&c, &d)))) in pixels.iter_mut().zip(samples).enumerate() {
+                if !P::ONCE || made.wrapping_shr(x as u32) & 1 == 0 {
+                    *pixel = mean([a, b, c, d]);
+                }
             }
             work.smoothed_pixels = work.smoothed_pixels.wrapping_add(pixels.len() as u32);
         }
@@ -250,7 +256,8 @@ fn cut<P: Paint>(paint: &P, tiles: &Tiles<'_>, out: &mut [P::Pixel], width_log2:
 }
 
 /// One mixed block, front to back: the frontmost sheet that covers a pixel shows; for every line of `pixels` at their centres, or `beside` them, quarters
-/// of a pixel across and down. What is the same for all lines is worked out once.
+/// of a pixel across and down. What is the same for all lines is worked out once; pixels of which all lines show one sheet are drawn in `once` instead where
+/// [`Paint::ONCE`] says so, and come back, a bit each.
 #[inline(never)]
 fn block<P: Paint, const LINES: usize>(
     site: &Site<'_, '_, '_>,
@@ -259,7 +266,8 @@ fn block<P: Paint, const LINES: usize>(
     mut pixels: [&mut [P::Pixel]; LINES],
     paint: &P,
     beside: [Option<[i32; 2]>; LINES],
-) {
+    once: &mut [P::Pixel],
+) -> u32 {
     let log2 = site.block_log2();
     let [left_of, above] = site.offset(mixed.block.into(), y >> log2);
     let row = y & (1u32 << log2).wrapping_sub(1);
@@ -267,7 +275,7 @@ fn block<P: Paint, const LINES: usize>(
     let (texture, wide) = (site.texture, pixels.first().map_or(0, |line| line.len() as u32));
     let moved = |form: Form, beside: Option<[i32; 2]>| beside.map_or(form, |beside| form.beside(beside));
     let mut left = [u32::MAX.wrapping_shr(32u32.wrapping_sub(wide)); LINES];
-    let mut sheets = mixed.sheets;
+    let (mut sheets, mut made) = (mixed.sheets, 0);
     while sheets != 0 && left != [0; LINES] {
         let place = usize::from(mixed.sheet).wrapping_add(sheets.trailing_zeros() as usize);
         sheets &= sheets.wrapping_sub(1);
@@ -289,13 +297,31 @@ fn block<P: Paint, const LINES: usize>(
             continue;
         }
         let forms = site.forms(sheet, offset);
+        let draw = |line: &mut [P::Pixel], shown: u32, forms: &[Form; 2]| {
+            span::paint(line, shown, Straight::new(forms, row, log2), texture, |uv, x| paint.at(uv, sheet.label(), x));
+        };
+        let by_chart = tested && sheet.test() != FIELD;
+        let apart = P::ONCE && LINES > 1;
+        if apart {
+            if by_chart {
+                for (shown, beside) in shown.iter_mut().zip(beside).filter(|(shown, _)| **shown != 0) {
+                    *shown = span::inside(&chart, *shown, wide, &forms.map(|form| moved(form, beside)), texture);
+                }
+            }
+            let all = shown.iter().fold(u32::MAX, |all, shown| all & shown);
+            if all != 0 {
+                draw(once, all, &forms);
+                made |= all;
+                (left, shown) = (left.map(|left| left & !all), shown.map(|shown| shown & !all));
+            }
+        }
         for ((line, left), (mut shown, beside)) in pixels.iter_mut().zip(&mut left).zip(shown.into_iter().zip(beside)) {
             let forms = forms.map(|form| moved(form, beside));
-            if tested && sheet.test() != FIELD && shown != 0 {
+            if by_chart && !apart && shown != 0 {
                 shown = span::inside(&chart, shown, wide, &forms, texture);
             }
             if shown != 0 {
-                span::paint(line, shown, Straight::new(&forms, row, log2), texture, |uv, x| paint.at(uv, sheet.label(), x));
+                draw(line, shown, &forms);
                 *left &= !shown;
             }
         }
@@ -308,4 +334,5 @@ fn block<P: Paint, const LINES: usize>(
             }
         }
     }
+    made
 }

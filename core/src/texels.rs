@@ -202,6 +202,7 @@ impl<C: Colours, F: Filter<Colour = C::Colour>> Paint for Lookup<C, F> {
     type Pixel = u16;
     const REACH: i32 = F::REACH;
     const SHORT: bool = F::SHORT && C::SHORT;
+    const ONCE: bool = F::REACH >= BESIDE;
 
     #[inline(always)]
     fn at(&self, uv: PlayUv, _: u8, x: usize) -> u16 {
