@@ -163,7 +163,8 @@ impl<'a, T: Texels> Player<'a, T> {
         T::bilinear_row(&mut self.playing, y, out);
     }
 
-    /// [`Player::bilinear_row`] with [`Player::smooth_row`]'s outlines: the best there is.
+    /// [`Player::bilinear_row`] with outlines like [`Player::smooth_row`]'s: the best there is. Only pixels of which the four show more than one sheet
+    /// are means of these; others are so of texels.
     #[inline]
     pub fn fine_row(&mut self, y: u32, out: &mut [u16]) {
         T::fine_row(&mut self.playing, y, out);
