@@ -36,7 +36,8 @@ pub enum BakeError {
     Atlas(#[from] AtlasError),
     /// No ray of any frame hits a triangle.
     #[error(
-        "the camera sees nothing: expected some of {rays} rays to hit a triangle, none does; check the camera's place, its direction and fov"
+        "the camera sees nothing: expected some of {rays} rays to hit a triangle, none does; check the camera's place, its direction and fov, and \
+         whether materials and textures have any alpha to show"
     )]
     Nothing {
         /// Rays cast.

@@ -25,7 +25,7 @@ pub(crate) struct Free {
     pub frames: u32,
 }
 
-/// One way to change settings: by how many rungs each. `scale`: the key interval is doubled or halved that many times.
+/// One way to change settings: by how many rungs each. `scale`: the key interval is doubled or, below 0, halved that many times.
 #[derive(Clone, Copy)]
 pub(crate) struct Step {
     cell: i32,
@@ -47,6 +47,8 @@ impl Step {
     /// Keys twice as far apart, half as far.
     pub const DOUBLE: Self = Self { scale: 1, ..Self::NONE };
     pub const HALF: Self = Self { scale: -1, ..Self::NONE };
+    /// Keys an eighth as far apart.
+    pub const EIGHTH: Self = Self { scale: -3, ..Self::NONE };
     /// Keys a little closer, a little farther apart.
     pub const CLOSER: Self = Self { interval: -1, ..Self::NONE };
     const FARTHER: Self = Self { interval: 1, ..Self::NONE };

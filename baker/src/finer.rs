@@ -27,13 +27,16 @@ const FLICKER: f64 = 1.25;
 const STEADILY: &str = "surfaces go straight on from key to key";
 const TURNING: &str = "outlines turn on their way from key to key";
 const BENDING: &str = "surfaces bend on their way from key to key";
-/// What closer keys have to gain there, dB: they take time in every frame. As much may farther ones lose of what is seen.
+/// What keys [`CLOSEST`] frames apart have to gain there, dB: they take time in every frame. As much may farther ones lose of what is seen.
 const TIME: f64 = 0.2;
 /// Frames between keys, at least, where nothing bends and they do not stand closer as it is: keys closer than that take more of every frame's time than all
 /// else.
 const CLOSEST: u32 = 4;
 /// Steps tried where positions bend, at most: fast turns want keys much closer.
 const BENT_TRIES: usize = 4;
+/// Paths of at most as many frames mostly go fast: closer keys are tried there whatever crosses cells, down to one a frame, and with larger cells. They are
+/// few, and a trial takes little time.
+const BRIEF: u32 = 64;
 /// Texels of the same from which on closer keys are tried whatever crosses cells: a path that turns as fast shows nothing right between its keys, and in
 /// every cell outlines of what passes by.
 const FAST: f64 = 5.0;
@@ -49,8 +52,10 @@ impl Other {
     /// What the user should know about `made`.
     pub fn said(&self, made: &Made) -> String {
         let Self { why, usual: Settings { cell, key_interval, .. }, told } = self;
+        // Either alone keeps both as they are usually.
+        let way = if *cell == made.settings.cell { format!("--key-interval {key_interval}") } else { format!("--cell {cell}") };
         format!(
-            "{why}: --cell {} --key-interval {} are used, {}; with {cell} and {key_interval} it were {told}: give --cell {cell} for that",
+            "{why}: --cell {} --key-interval {} are used, {}; with {cell} and {key_interval} it were {told}: give {way} for that",
             made.settings.cell,
             made.settings.key_interval,
             made.told(),
@@ -66,8 +71,8 @@ pub(crate) fn crossed(quality: &Brief) -> bool {
 /// Steps to climb by, and how many tries they get.
 type Climb = (&'static [Step], usize);
 
-/// The climbs worth a try after cells of `cell` pixels gave `quality`, the second one if the first leads nowhere; and why.
-fn climbs(cell: u32, quality: &Brief) -> Option<(&'static [Climb], &'static str)> {
+/// The climbs worth a try after cells of `cell` pixels gave `quality`, each if those before it lead nowhere, on a path that is `brief` or not; and why.
+fn climbs(cell: u32, quality: &Brief, brief: bool) -> Option<(&'static [Climb], &'static str)> {
     // Smaller cells are there for the picture: keys still farther apart would take that back.
     const FINER: Climb = (&[Step::FINER], 1);
     const FARTHER: Climb = (&[Step::DOUBLE], 1);
@@ -75,18 +80,26 @@ fn climbs(cell: u32, quality: &Brief) -> Option<(&'static [Climb], &'static str)
     const CLOSER: Climb = (&[Step::COARSER, Step::HALF], BENT_TRIES);
     const CLOSE: Climb = (&[Step::HALF, Step::CLOSER], 2);
     const FASTER: Climb = (&[Step::HALF], BENT_TRIES);
+    // Where a camera shakes, keys twice as close hit no more of it.
+    const FASTEST: Climb = (&[Step::HALF, Step::EIGHTH], BENT_TRIES);
+    const BRIEFLY: Climb = (&[Step::HALF, Step::COARSER, Step::CLOSER], BENT_TRIES);
     let (torn, bent) = (quality.wrong_surface_percent >= TORN, quality.path_error_texels.p99);
     let climbs: &[Climb] = match torn {
+        true if (bent < STEADY || cell > USUAL) && brief => &[FINER, FARTHER, FASTEST],
         true if bent < STEADY || cell > USUAL => &[FINER, FARTHER],
+        true if bent < BENT && brief => &[FARTHER, FASTEST],
         true if bent < BENT => &[FARTHER],
+        true if brief => &[FASTEST],
         true if bent >= FAST => &[FASTER],
         false if bent >= BENT => &[CLOSER],
+        false if bent < STEADY && brief => &[FAR, BRIEFLY],
         false if bent < STEADY => &[FAR, CLOSE],
+        false if brief => &[BRIEFLY],
         false => &[CLOSE],
         true => return None,
     };
     let why = match torn {
-        true if bent >= FAST && cell <= USUAL => BENDING,
+        true if (bent >= FAST || brief && bent >= BENT) && cell <= USUAL => BENDING,
         true => "many outlines cross every cell",
         false if bent >= BENT => BENDING,
         false => STEADILY,
@@ -94,12 +107,12 @@ fn climbs(cell: u32, quality: &Brief) -> Option<(&'static [Climb], &'static str)
     Some((climbs, why))
 }
 
-/// What `keys` closer together (`Less`) or farther apart gain, dB, that are worth so much more beside `exact` rays, less what `time` in every frame is worth; `visible`
-/// tells how much more by what is seen of them.
-fn gain<E>(keys: Ordering, exact: f64, time: f64, visible: impl FnOnce() -> Result<f64, E>) -> Result<f64, E> {
+/// What `keys` closer together (`Less`) or farther apart gain, dB, that are worth so much more beside `exact` rays, less what their `time` in every frame is
+/// worth, there and by what is seen; `visible` tells how much more they are worth by that.
+fn gain<E>(keys: Ordering, exact: f64, time: [f64; 2], visible: impl FnOnce() -> Result<f64, E>) -> Result<f64, E> {
     match keys {
-        Ordering::Less if exact > time => Ok(exact - time),
-        Ordering::Less => Ok(visible()? - TIME),
+        Ordering::Less if exact > time[0] => Ok(exact - time[0]),
+        Ordering::Less => Ok(visible()? - time[1]),
         Ordering::Greater if exact > 0.0 && visible()? < -TIME => Ok(f64::NEG_INFINITY),
         _ => Ok(exact),
     }
@@ -119,11 +132,13 @@ pub(crate) fn choose(
     seen: &Seen<'_>,
     progress: Progress<'_>,
 ) -> Result<(Made, Option<Other>), BakeError> {
-    let Some((climbs, why)) = climbs(usual.settings.cell, all) else { return Ok((usual, None)) };
+    let brief = scene.playback.frames <= BRIEF;
+    let Some((climbs, why)) = climbs(usual.settings.cell, all, brief) else { return Ok((usual, None)) };
     let picture = usual.picture(flat);
     // What is seen is told where it is asked for: the scene has to be rendered for it.
     let (exact, mut visible) = (usual.worth(picture), None);
-    let time = if all.path_error_texels.p99 < BENT { TIME } else { 0.0 };
+    // Where surfaces bend, exact rays say what there is to gain, at any price.
+    let free_of_charge = all.path_error_texels.p99 >= BENT;
     // By how much `made` is worth more than the usual one.
     let mut gained = |made: &Made| -> Result<f64, BakeError> {
         let [before, after] = [&usual, made].map(|made| made.quality.wrong_surface_percent);
@@ -135,7 +150,9 @@ pub(crate) fn choose(
         if made.settings.cell != usual.settings.cell {
             return Ok(exact);
         }
-        gain(keys, exact, time, || {
+        // Keys closer than usual ones take as many times the time.
+        let time = TIME * f64::from(CLOSEST) / f64::from(made.settings.key_interval.clamp(1, CLOSEST));
+        gain(keys, exact, [if free_of_charge { 0.0 } else { time }, time], || {
             let before = visible.map_or_else(|| seen.worth(&usual, flat, picture), Ok)?;
             visible = Some(before);
             Ok(seen.worth(made, flat, picture)? - before)
@@ -144,7 +161,7 @@ pub(crate) fn choose(
     // Where a path turns quickly, or is short, keys stand much closer already.
     let (asked, spacing) = (usual.settings.key_interval, usual.encoded.grid.spacing());
     let stand = Settings { key_interval: if 2 * spacing <= asked { spacing } else { asked }, ..usual.settings };
-    let closest = CLOSEST.min((stand.key_interval / 2).max(1));
+    let closest = if brief { 1 } else { CLOSEST.min((stand.key_interval / 2).max(1)) };
     let free = Free { cell: true, interval: true, lambda: false, time: false, space: false, frames: scene.playback.frames };
     let mut better: Option<(f64, Made)> = None;
     let most: usize = climbs.iter().map(|(_, tries)| tries).sum();
@@ -267,7 +284,7 @@ mod tests {
 
     #[test]
     fn closer_keys_gain_by_either_measure_and_farther_ones_by_both() {
-        let gain = |keys, exact, visible| gain(keys, exact, TIME, || Ok::<_, ()>(visible)).unwrap();
+        let gain = |keys, exact, visible| gain(keys, exact, [TIME; 2], || Ok::<_, ()>(visible)).unwrap();
         assert_eq!([gain(Ordering::Less, 0.5, -9.0), gain(Ordering::Less, -0.5, 0.5)], [0.5 - TIME, 0.5 - TIME]);
         assert!(gain(Ordering::Less, -0.5, 0.5 * TIME) < 0.0);
         assert_eq!([gain(Ordering::Greater, 0.5, -0.5 * TIME), gain(Ordering::Greater, -0.5, 9.0)], [0.5, -0.5]);
@@ -288,11 +305,12 @@ mod tests {
 
     #[test]
     fn what_is_tried_depends_on_outlines_and_bends() {
-        let tried = |cell, wrong_surface_percent, p99| {
+        let of = |cell, wrong_surface_percent, p99, brief| {
             let path_error_texels = verify::PathError { p99, ..verify::PathError::default() };
-            climbs(cell, &Brief { wrong_surface_percent, path_error_texels, ..Brief::default() })
+            climbs(cell, &Brief { wrong_surface_percent, path_error_texels, ..Brief::default() }, brief)
                 .map(|(climbs, why)| (climbs.len(), why.split(' ').next().unwrap()))
         };
+        let tried = |cell, wrong_surface_percent, p99| of(cell, wrong_surface_percent, p99, false);
         // Torn and steady, torn and not quite so, both torn and bent, the last in large cells; bent; neither; steady.
         assert_eq!([tried(8, 2.0, 0.9), tried(8, 2.0, 1.0), tried(8, 2.0, 2.0)], [Some((2, "many")), Some((1, "many")), None]);
         assert_eq!(
@@ -302,5 +320,10 @@ mod tests {
         assert_eq!(tried(8, 1.9, 0.9), Some((2, "surfaces")));
         // So fast that outlines are no matter.
         assert_eq!([tried(8, 20.0, 4.9), tried(8, 20.0, 5.0)], [None, Some((1, "surfaces"))]);
+        // On a brief path closer keys come last, or alone.
+        assert_eq!(
+            [of(8, 2.0, 0.9, true), of(8, 2.0, 1.0, true), of(8, 2.0, 2.0, true)].map(|of| of.map(|of| of.0)),
+            [Some(3), Some(2), Some(1)]
+        );
     }
 }

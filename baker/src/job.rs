@@ -24,6 +24,8 @@ use std::time::Instant;
 
 /// Screens wider than this get cells of 16 pixels unless told otherwise.
 const WIDE: u32 = 640;
+/// Keys that trials of charts have, at least, on paths with as many frames.
+const TRIAL_KEYS: u32 = 16;
 
 /// What the bundle is to reach.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -167,6 +169,8 @@ pub struct Baked {
     pub flat: Flat,
     /// What made them.
     pub settings: Settings,
+    /// Mean PSNR against exact rays before texels were coloured by what is played, dB.
+    pub(crate) psnr_before: f64,
 }
 
 /// What was chosen: by the settings or by a search.
@@ -185,7 +189,7 @@ pub(crate) struct Chosen {
 pub(crate) struct Whole {
     pub settings: Settings,
     pub memory: usize,
-    /// Mean PSNR against exact rays, dB.
+    /// Mean PSNR against exact rays before texels are coloured by what is played, dB.
     pub psnr: f64,
 }
 
@@ -221,7 +225,7 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
         if memory <= room {
             return Ok(baked);
         }
-        whole = Some(Whole { settings: baked.settings, memory, psnr: baked.report.quality.psnr_mean });
+        whole = Some(Whole { settings: baked.settings, memory, psnr: baked.psnr_before });
     }
     // What outlines need of it, flash has. Only where nothing is searched for are finer ones tried.
     let outline = whole.map_or(options.source.outline, |whole| whole.settings.atlas.outline);
@@ -272,6 +276,7 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
     // In other cells what a sheet has to save is another thing.
     let mut made = if prunes && other.is_some() { fewer::anew(scene, &flat, made, progress)? } else { made };
     let finer = other.map(|other| other.said(&made));
+    let psnr_before = made.quality.psnr_mean;
     let (search_seconds, paint_start) = (search_seconds + finer_start.elapsed().as_secs_f64(), Instant::now());
     let repainted = painter.as_ref().map_or(Ok(false), |painter| painter.repaint(&mut made, &mut flat.atlas, options.goal))?;
     let (paint_seconds, verify_start) = (paint_seconds + paint_start.elapsed().as_secs_f64(), Instant::now());
@@ -306,7 +311,7 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
     let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings, spaces, bends, outlines, repainted };
     let mut report = Report::new(&origin, &inspection, quality, truth, work, seconds);
     report.warnings.extend(warnings.into_iter().chain(finer));
-    Ok(Baked { bundle: encoded.bundle, report, flat, settings })
+    Ok(Baked { bundle: encoded.bundle, report, flat, settings, psnr_before })
 }
 
 /// How to cut the surface: as asked for, as the scene brings it, or as trials show.
@@ -321,7 +326,14 @@ fn choice(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Res
             Ok(Choice { rewarped: options.rewarp.unwrap_or(choice.rewarped), ..choice })
         }
         None if chart::brings_own(scene) => Ok(Choice { rewarped, ..Family::Own.into() }),
-        None => choose::charts(tracer, &options.settings(scene.playback.width), options.rewarp, progress),
+        None => {
+            let mut settings = options.settings(scene.playback.width);
+            if options.key_interval.is_none() {
+                // Where that is close, the path goes fast, and keys will stand as close, or closer.
+                settings.key_interval = settings.key_interval.min((scene.playback.frames / TRIAL_KEYS).max(1));
+            }
+            choose::charts(tracer, &settings, options.rewarp, progress)
+        }
     }
 }
 

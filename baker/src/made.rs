@@ -48,6 +48,6 @@ impl Made {
     pub fn told(&self) -> String {
         let Self { encoded: Encoded { bundle, .. }, quality, .. } = self;
         let memory = verify::memory(bundle).map(grouped).unwrap_or_default();
-        format!("{:.1} dB in a bundle of {} B and {memory} B of memory", quality.psnr_mean, grouped(bundle.len()))
+        format!("{:.1} dB before repainting, in a bundle of {} B and {memory} B of memory", quality.psnr_mean, grouped(bundle.len()))
     }
 }

@@ -196,9 +196,13 @@ fn gave_up(room: usize, asked: &Settings, whole: Option<Whole>, tried: &Tried, p
     let changes: Vec<String> = changes.into_iter().flatten().collect();
     let cost = match whole {
         Some(Whole { memory, psnr: most, .. }) => {
-            format!("{psnr:.2} dB in {} bytes of memory, where {most:.2} dB take {}", grouped(tried.memory), grouped(memory))
+            format!(
+                "{psnr:.2} dB before repainting, in {} bytes of memory, where {most:.2} dB take {}",
+                grouped(tried.memory),
+                grouped(memory)
+            )
         }
-        None => format!("{psnr:.2} dB in {} bytes of memory", grouped(tried.memory)),
+        None => format!("{psnr:.2} dB before repainting, in {} bytes of memory", grouped(tried.memory)),
     };
     format!("--ram {room}: to fit, the bundle has {}: {cost}", changes.join(", "))
 }

@@ -300,6 +300,7 @@ impl Report {
 /// What keeps surfaces too small for cells of `cell` pixels and keys every `interval` frames.
 fn finer(cell: u32, interval: u32) -> &'static str {
     match (cell, interval) {
+        (5.., 2..) => "a shorter --key-interval or smaller cells (--cell) keep them",
         (5.., _) => "smaller cells (--cell) keep them",
         // There are no smaller cells than of 4 pixels.
         (_, 2..) => "a shorter --key-interval keeps them",
