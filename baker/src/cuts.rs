@@ -22,10 +22,14 @@ const STRANGE: usize = 50;
 #[must_use]
 pub fn keys(gbuffer: &GBuffer, grid: &KeyGrid) -> Option<Vec<u32>> {
     let last = grid.frames - 1;
-    let jumps: Vec<usize> = (0..last).into_par_iter().map(|frame| jump(gbuffer, grid.size, frame)).collect();
+    let jumps: Vec<usize> = (0..last).into_par_iter().map(|frame| jump(gbuffer, grid.size, [frame, frame + 1])).collect();
     let calm = |frame: Option<usize>| frame.and_then(|frame| jumps.get(frame)).is_none_or(|&jump| jump <= LEAST);
     let cuts = (0..jumps.len()).filter(|&at| jumps[at] >= MOST && calm(at.checked_sub(1)) && calm(Some(at + 1)));
     let mut keys: Vec<u32> = cuts.map(|at| at as u32).flat_map(|at| at.saturating_sub(1)..=(at + 2).min(last)).collect();
+    // A path that loops may well end elsewhere than it begins.
+    if grid.looping && last > 1 && jump(gbuffer, grid.size, [last, 0]) >= MOST && calm(Some(0)) && calm(Some(jumps.len() - 1)) {
+        keys.extend([0, 1, last - 1, last]);
+    }
     let cut = keys.clone();
     keys.extend(&grid.keys);
     keys.sort_unstable();
@@ -70,11 +74,11 @@ fn strange(a: &[usize], b: &[usize]) -> bool {
     alone(a, b) || alone(b, a)
 }
 
-/// The share of the pixels, background aside, that see another place in the frame after `frame`, percent. Of all pixels: a fence whose boards
+/// The share of the pixels, background aside, that see another place in the second of two frames than in the first, percent. Of all pixels: a fence whose boards
 /// are as far apart as nodes passes all of those at once.
-fn jump(gbuffer: &GBuffer, [width, height]: [usize; 2], frame: u32) -> usize {
+fn jump(gbuffer: &GBuffer, [width, height]: [usize; 2], frames: [u32; 2]) -> usize {
     let (mut jumps, mut count) = (0, 0);
-    let frames = [frame, frame + 1].map(|frame| frame as usize * width * height..(frame as usize + 1) * width * height);
+    let frames = frames.map(|frame| frame as usize * width * height..(frame as usize + 1) * width * height);
     for (from, to) in frames[0].clone().zip(frames[1].clone()) {
         // Behind everything nothing moves.
         if gbuffer.label[from] == 0 && gbuffer.label[to] == 0 {
@@ -122,6 +126,20 @@ mod tests {
         };
         assert_eq!(keys(1), None, "half of the first key's pillars are in the next");
         assert_eq!(keys(4), Some(vec![0, 4, 8, 12, 16, 19, 23]), "a screen in eight frames: half of it in four");
+    }
+
+    #[test]
+    fn a_loop_that_does_not_close_is_cut_at_its_end() {
+        let (width, height, frames) = (32, 24, 24);
+        let keys = |shift: fn(u32) -> u32| {
+            let places =
+                (0..frames).flat_map(|frame| (0..width * height).map(move |at| [(at % width + shift(frame)) as f32, (at / width) as f32]));
+            let uv: Vec<[f32; 2]> = places.collect();
+            let gbuffer = GBuffer { width, height, frames, label: vec![1; uv.len()], uv: uv.into() };
+            keys(&gbuffer, &KeyGrid::new(&gbuffer, 3, 8, true, [TIME_CUBIC, SPACE_CUBIC]))
+        };
+        assert_eq!(keys(|frame| 3 * frame), Some(vec![0, 1, 8, 16, 22, 23]));
+        assert_eq!(keys(|frame| 3 * frame.min(24 - frame)), None);
     }
 
     #[test]
