@@ -180,20 +180,20 @@ pub struct Bake {
     /// The whole bundle takes at most this many bytes (also 256K, 2M), at the best quality that does.
     ///
     /// Quality is measured against the antialiased scene; cells, keys and the source image are searched.
-    #[arg(long, value_name = "BYTES", value_parser = budget, conflicts_with_all = ["psnr", "ram"])]
+    #[arg(long, value_name = "BYTES", value_parser = budget, allow_negative_numbers = true, conflicts_with_all = ["psnr", "ram"])]
     pub budget: Option<u64>,
     /// The smallest bundle whose mean PSNR against exact rays through its source image reaches this many dB.
     ///
     /// Cells and keys are searched; the source image stays as --atlas and --density ask, and gets coarser only where nothing
     /// else reaches the goal.
-    #[arg(long, value_name = "DB", value_parser = psnr, conflicts_with = "ram")]
+    #[arg(long, value_name = "DB", value_parser = psnr, allow_negative_numbers = true, conflicts_with = "ram")]
     pub psnr: Option<f64>,
     /// Playing takes at most this many bytes of working memory (also 48K), at the best quality that does.
     ///
     /// A bundle that needs no more stays as it is. Else linear --time, linear --space, larger cells and closer keys are tried, each unless it is
     /// given (a given cell may grow all the same), and from what fits on to what is worth more; what was given up is said at the end. A row of
     /// pixels comes on top: two bytes each.
-    #[arg(long, value_name = "BYTES", value_parser = budget)]
+    #[arg(long, value_name = "BYTES", value_parser = budget, allow_negative_numbers = true)]
     pub ram: Option<u64>,
     /// Writes bytes, seconds, quality and warnings as JSON.
     #[arg(long, value_name = "FILE.json")]

@@ -194,9 +194,12 @@ pub(crate) fn choose(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::{Path, Pose};
     use crate::scene::builtin;
     use crate::trace::Tracer;
     use crate::{bake, verify};
+    use glam::DVec3;
+    use std::sync::Arc;
 
     fn made(name: &str, size: [u32; 2], frames: u32, settings: Settings) -> (Scene, Flat, Made) {
         let mut scene = builtin::build(name).unwrap();
@@ -266,6 +269,31 @@ mod tests {
         let before = usual.quality.psnr_mean;
         let (kept, _) = chosen(&scene, &flat, usual);
         assert!(kept.settings.key_interval < 8 && kept.quality.psnr_mean > before + 2.0, "{before} {}", kept.told());
+    }
+
+    /// A path that is shaken from side to side and up and down, so that no two frames in a row look the same way.
+    struct Shaken(Arc<dyn Path>, f64);
+
+    impl Path for Shaken {
+        fn pose(&self, s: f64) -> Pose {
+            let (pose, frame) = (self.0.pose(s), s * self.1);
+            let by = DVec3::new(libm::sin(2.3 * frame), libm::cos(2.9 * frame), 0.0);
+            Pose { eye: pose.eye + by, ..pose }
+        }
+    }
+
+    #[test]
+    fn shaken_cameras_get_a_key_a_frame() {
+        let (mut scene, _, _) = made("columns", [96, 72], 4, Settings::default());
+        scene.playback.frames = 25;
+        scene.camera = Arc::new(Shaken(scene.camera, 24.0));
+        let flat = bake::flatten(&scene, &Settings::default().atlas, &|_, _| {}).unwrap();
+        let usual = Made::new(&scene, &flat, Settings::default()).unwrap();
+        assert!(usual.quality.wrong_surface_percent >= TORN, "{}", usual.told());
+        let before = usual.quality.psnr_mean;
+        let (kept, other) = chosen(&scene, &flat, usual);
+        assert_eq!((kept.settings.key_interval, other.is_some()), (1, true));
+        assert!(kept.quality.psnr_mean > before + 5.0, "{before} {}", kept.told());
     }
 
     #[test]

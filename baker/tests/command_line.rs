@@ -66,6 +66,9 @@ fn memory_is_kept_to_or_what_it_takes_is_said() {
     refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--ram", "1K"]), 1, "--ram: expected room for ");
     refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--ram", "1K", "--time", "cubic"]), 1, "or leave --time to the search");
     refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--ram", "1K", "--budget", "9K"]), 2, "cannot be used with");
+    for (option, wanted) in [("--ram", "a number of bytes"), ("--budget", "a number of bytes"), ("--psnr", "expected")] {
+        refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", option, "-5"]), 2, wanted);
+    }
     assert_eq!(names(dir.path()), ["a.obj"]);
     // Without --ram finer cells are tried too, and take more: this is the most that nothing has to be given up for.
     let output = bake(dir.path(), "a.obj", &["-o", "a.cubist", "--report", "a.json", "--ram", "1M"]);

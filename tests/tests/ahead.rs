@@ -134,6 +134,8 @@ fn a_frame_that_is_shown_again_decodes_nothing() {
 fn no_seek_decodes_more_keys_than_the_bundle_says() {
     for (looping, time) in [(false, TIME_CUBIC), (true, TIME_CUBIC), (false, TIME_LINEAR), (true, TIME_HOLD)] {
         let frames = if looping { 60 } else { 61 };
+        // This path ends elsewhere than it begins: keys that adapt to that stand a frame apart there, and are decoded as often.
+        let bake = if looping { bake_even } else { bake };
         let bytes = bake("pivot", [64, 48], frames, looping, time, 4);
         let bundle = Bundle::parse(&bytes).expect("the baker's bytes parse");
         let limit = u32::from(bundle.limits().seek_keys);
