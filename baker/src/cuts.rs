@@ -74,8 +74,8 @@ fn strange(a: &[usize], b: &[usize]) -> bool {
     alone(a, b) || alone(b, a)
 }
 
-/// The share of the pixels, background aside, that see another place in the second of two frames than in the first, percent. Of all pixels: a fence whose boards
-/// are as far apart as nodes passes all of those at once.
+/// The share of the pixels, background aside, that see another place in the second of two frames than in the first, percent. Of all pixels: a fence
+/// whose boards are as far apart as nodes passes all of those at once.
 fn jump(gbuffer: &GBuffer, [width, height]: [usize; 2], frames: [u32; 2]) -> usize {
     let (mut jumps, mut count) = (0, 0);
     let frames = frames.map(|frame| frame as usize * width * height..(frame as usize + 1) * width * height);

@@ -34,12 +34,12 @@ const TIME: f64 = 0.2;
 const CLOSEST: u32 = 4;
 /// Steps tried where positions bend, at most: fast turns want keys much closer.
 const BENT_TRIES: usize = 4;
-/// Paths of at most as many frames mostly go fast: closer keys are tried there whatever crosses cells, down to one a frame, and with larger cells. They are
-/// few, and a trial takes little time.
-const BRIEF: u32 = 64;
 /// Texels of the same from which on closer keys are tried whatever crosses cells: a path that turns as fast shows nothing right between its keys, and in
 /// every cell outlines of what passes by.
 const FAST: f64 = 5.0;
+/// Paths of at most as many frames mostly go fast: closer keys are tried there whatever crosses cells, down to one a frame, and with larger cells. They are
+/// few, and a trial takes little time.
+const BRIEF: u32 = 64;
 
 /// Why a bundle is of other cells or intervals than usual, and what the usual one was.
 pub(crate) struct Other {
