@@ -14,7 +14,7 @@ use crate::made::Made;
 use crate::outlines;
 use crate::repaint::Painter;
 use crate::report::{Origin, Report, Seconds};
-use crate::scene::Scene;
+use crate::scene::{self, Scene};
 use crate::seen::Seen;
 use crate::straight;
 use crate::trace::Tracer;
@@ -208,7 +208,11 @@ pub fn bake_scene(scene: &Scene, options: &Options, progress: Progress<'_>) -> R
 /// The same.
 pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<Baked, BakeError> {
     progress("building the hierarchy", 0.0);
-    by(&Tracer::new(scene), options, progress)
+    // Charts that the scene brings are as it wants them.
+    let split = if chart::brings_own(scene) { None } else { scene::split(scene) };
+    let mut baked = by(&Tracer::new(split.as_ref().unwrap_or(scene)), options, progress)?;
+    baked.report.triangles = scene.triangles.len();
+    Ok(baked)
 }
 
 /// Like [`run`], of a scene whose rays `tracer` casts.

@@ -14,10 +14,12 @@ mod obj;
 mod picture;
 mod ply;
 mod polygon;
+mod split;
 mod turned;
 
 pub use error::SceneError;
 pub use load::{Overrides, load, load_builtin};
+pub(crate) use split::split;
 pub use turned::turned;
 
 use crate::camera::Path;
@@ -29,7 +31,7 @@ use std::sync::Arc;
 pub struct Triangle {
     /// Corners, world space.
     pub position: [DVec3; 3],
-    /// Shading normals at the corners, unit length; all zero: use the face's own.
+    /// Shading normals at the corners, unit length as loaded, straight between; all zero: use the face's own.
     pub normal: [Vec3; 3],
     /// Texture coordinates of the base colour texture, in texture widths and heights, v down from the top row.
     pub uv: [Vec2; 3],
