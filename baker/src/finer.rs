@@ -39,7 +39,7 @@ const BENT_TRIES: usize = 4;
 const FAST: f64 = 5.0;
 /// Paths of at most as many frames mostly go fast: closer keys are tried there whatever crosses cells, down to one a frame, and with larger cells. They are
 /// few, and a trial takes little time.
-const BRIEF: u32 = 64;
+pub(crate) const BRIEF: u32 = 64;
 
 /// Why a bundle is of other cells or intervals than usual, and what the usual one was.
 pub(crate) struct Other {

@@ -24,7 +24,7 @@ use std::time::Instant;
 
 /// Screens wider than this get cells of 16 pixels unless told otherwise.
 const WIDE: u32 = 640;
-/// Keys that trials of charts have, at least, on paths with as many frames.
+/// Keys that trials of charts have, at least, on paths with as many frames; on brief ones twice as many.
 const TRIAL_KEYS: u32 = 16;
 
 /// What the bundle is to reach.
@@ -334,7 +334,9 @@ fn choice(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Res
             let mut settings = options.settings(scene.playback.width);
             if options.key_interval.is_none() {
                 // Where that is close, the path goes fast, and keys will stand as close, or closer.
-                settings.key_interval = settings.key_interval.min((scene.playback.frames / TRIAL_KEYS).max(1));
+                let frames = scene.playback.frames;
+                let keys = if frames <= finer::BRIEF { 2 * TRIAL_KEYS } else { TRIAL_KEYS };
+                settings.key_interval = settings.key_interval.min((frames / keys).max(1));
             }
             choose::charts(tracer, &settings, options.rewarp, progress)
         }
