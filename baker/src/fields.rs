@@ -9,7 +9,7 @@ use crate::fit::{self, Problem, Target};
 use crate::gbuffer::GBuffer;
 use crate::sheets::{KeyGrid, Layers, Sheets};
 use cubist_core::fixed::{field_code, field_distance};
-use cubist_core::format::{SPACE_LINEAR, TIME_LINEAR};
+use cubist_core::format::SPACE_LINEAR;
 use cubist_core::lists::CHART;
 use rayon::prelude::*;
 
@@ -112,7 +112,7 @@ impl<'a> Outlines<'a> {
     ) -> Problem<'s, impl Fn(usize, u32, &mut Vec<Target>) + Sync + use<'s, 'a>> {
         let &Outlines { grid, sheets, layers, .. } = self;
         let targets = |index: usize, frame: u32, targets: &mut Vec<Target>| self.targets(index, frame, &sides[index], targets);
-        Problem { grid, sheets, layers, time: TIME_LINEAR, space: SPACE_LINEAR, prior: None, known, refit: hinge, targets }
+        Problem { grid, sheets, layers, time: grid.field_time(), space: SPACE_LINEAR, prior: None, known, refit: hinge, targets }
     }
 
     /// The fields of those sheets that are tested by them, or of all, from nothing.

@@ -177,7 +177,7 @@ fn observe(evidence: &Evidence<'_>, look: &Look, fields: Option<&Fields>, index:
     let then: Vec<usize> = list.iter().filter_map(|label| look.list.iter().position(|then| then == label)).collect();
     let (mut seen, mut pixels) = (Seen::default(), look.pixels.iter().zip(look.costs.chunks_exact(list.len())));
     for frame in grid.frames_of(interval) {
-        let linear = grid.weights(interval, frame, TIME_LINEAR);
+        let linear = grid.weights(interval, frame, grid.field_time());
         // Fields do not bend.
         let of = |fields: &Fields| patches.iter().map(|patch| patch::first(&patch.values(&fields.distance, &linear))).collect();
         let distances: Vec<[[f32; 2]; CORNERS.len()]> = fields.map(of).unwrap_or_default();

@@ -84,7 +84,7 @@ impl<'a> Work<'a> {
         let codes = fields.distance.iter().map(|&[field, _]| code(field)).collect();
         let size = 1usize << grid.grid.log2;
         let share = |place: usize| bilinear([place % size, place / size].map(|at| at as f32 / size as f32));
-        let weight = |interval, frame| grid.weights(interval, frame, TIME_LINEAR)[3][2];
+        let weight = |interval, frame| grid.weights(interval, frame, grid.field_time())[3][2];
         let linear = (0..grid.intervals()).map(|i| grid.frames_of(i).map(|frame| weight(i, frame)).collect()).collect();
         let shares = (0..size * size).map(share).collect();
         let mut work = Self { grid, shares, linear, intervals: Vec::new(), uses: vec![Vec::new(); grid.keys.len()], codes };

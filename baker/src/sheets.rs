@@ -2,7 +2,7 @@
 //! From the G-buffer; `fit` gives every sheet's corners their positions, `order` sorts them front to back.
 
 use crate::gbuffer::GBuffer;
-use cubist_core::format::{MAX_SHEETS, TIME_CUBIC};
+use cubist_core::format::{MAX_SHEETS, TIME_CUBIC, TIME_LINEAR};
 use cubist_core::grid::Grid;
 use cubist_core::timeline::weights;
 use rayon::prelude::*;
@@ -111,6 +111,12 @@ impl KeyGrid {
         let lengths = [self.length(at - 1), self.length(at), self.length(at + 1)];
         let one = cubist_core::fixed::ONE as f32;
         weights(time, lengths, frame - self.keys[interval]).map(|set| set.map(|weight| weight as f32 / one))
+    }
+
+    /// How fields go from key to key: straight, or held like positions.
+    #[must_use]
+    pub fn field_time(&self) -> u8 {
+        self.time.min(TIME_LINEAR)
     }
 
     /// Columns and rows of pixels of a cell, cut off at the screen's edge.

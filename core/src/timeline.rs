@@ -28,7 +28,7 @@ pub struct Moment {
 }
 
 /// The weights `passed` frames into an interval of `lengths[1]` frames, between intervals of `lengths[0]` and `lengths[2]`
-/// (0: there is none): a cubic Hermite curve whose tangents are the secants over two intervals (Catmull and Rom 1974, for unequal intervals), or
+/// (0: there is none). Held, those of the start up to the end. Cubic: a Hermite curve whose tangents are the secants over two intervals (Catmull and Rom 1974, for unequal intervals), or
 /// over the one where a key is missing.
 #[must_use]
 pub fn weights(time: u8, lengths: [u32; 3], passed: u32) -> WeightSet {
@@ -38,7 +38,10 @@ pub fn weights(time: u8, lengths: [u32; 3], passed: u32) -> WeightSet {
     // Values of at most one in Q28 and lengths below 2^24 multiply to less than 2^54.
     let share = |x: i64, part: i64, whole: i64| x.wrapping_mul(part).checked_div_euclid(whole).unwrap_or(0);
     let one = 1i64 << INNER;
-    let t = if time == TIME_HOLD { 0 } else { share(one, i64::from(passed), length).clamp(0, one) };
+    let t = match share(one, i64::from(passed), length).clamp(0, one) {
+        t if t < one && time == TIME_HOLD => 0,
+        t => t,
+    };
     let rounded = |x: i64| {
         const DROP: u32 = INNER - WEIGHT_BITS;
         (x.wrapping_add(1 << (DROP - 1)) >> DROP) as i32
@@ -142,9 +145,8 @@ mod tests {
                     }
                 }
                 assert_eq!(weights(time, lengths, 0), [[0, ONE, 0, 0]; 4]);
-                if time != TIME_HOLD {
-                    assert_eq!(weights(time, lengths, lengths[1]), [[0, 0, ONE, 0]; 4]);
-                }
+                assert_eq!(weights(time, lengths, lengths[1]), [[0, 0, ONE, 0]; 4]);
+                assert!(time != TIME_HOLD || weights(time, lengths, lengths[1] - 1) == [[0, ONE, 0, 0]; 4]);
             }
         }
     }

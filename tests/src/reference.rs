@@ -40,7 +40,7 @@ pub fn weights(time: u8, lengths: [u32; 3], t: f64, missing: [bool; 2]) -> Four 
     match time {
         // An interval of no frames is that of a path of one frame.
         _ if lengths[1] == 0 => return [0.0, 1.0, 0.0, 0.0],
-        TIME_HOLD => return [0.0, 1.0, 0.0, 0.0],
+        TIME_HOLD if t < 1.0 => return [0.0, 1.0, 0.0, 0.0],
         TIME_CUBIC => {}
         _ => return [0.0, 1.0 - t, t, 0.0],
     }

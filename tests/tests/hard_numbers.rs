@@ -62,10 +62,7 @@ fn both_ends_of_an_interval_are_exactly_the_keys() {
         };
         let bytes = scene.bundle(place).expect("it fits");
         let bound = PACKED + SPREAD * 0.5 * stored(&bytes);
-        // Held, a key shows from its frame up to the next one's, and the last interval of a path that ends its last frame as well (FORMAT.md,
-        // Time): its two frames share what is between them, so that neither is exact. All before are.
-        let frames = if time == TIME_HOLD { scene.frames - 2 } else { scene.frames };
-        let off = off(&bytes, (0..frames).step_by(interval as usize), place);
+        let off = off(&bytes, (0..scene.frames).step_by(interval as usize), place);
         assert!(off <= bound, "time {time}, keys every {interval}: {off} texels off at keys, bound {bound}");
     }
 }
