@@ -70,7 +70,7 @@ impl Paint for Probes {
 /// Where the pixels of `tiles` come from, `PIXELS` pixels each: for every tile by itself, since their labels differ.
 #[inline(always)]
 fn probe<const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(tiles: &Tiles<'_>, out: &mut [Probe]) {
-    let backdrop = |uv, _| Probe { label: BACKDROP as u8, at: uv };
+    let backdrop = |uv, _| [Probe { label: BACKDROP as u8, at: uv }; 2];
     for (tile, pixels) in tiles.tiles.iter().zip(out.as_chunks_mut::<PIXELS>().0) {
         let window = |row: u16| Some(row).filter(|_| tile.in_window());
         let along = |row: u16, pixels: &mut [Probe; PIXELS], line: Line<'_>| {

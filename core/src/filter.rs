@@ -65,21 +65,21 @@ impl Filter for Nearest {
 /// four, for the price of one.
 #[derive(Clone, Copy, Debug)]
 pub struct Dither {
-    /// Eighths of a texel across and down, for even and odd pixels of a row.
-    eighths: [[i32; 2]; 2],
+    /// Eighths of a texel across and down, for even pixels of a row: odd ones move as far the other way.
+    eighths: [i32; 2],
 }
 
 impl Dither {
     /// That of row `y`.
     pub const fn new(y: u32) -> Self {
         // Along either axis the four are -3, -1, 1, 3: a threshold in each quarter.
-        Self { eighths: if y & 1 == 0 { [[-1, -3], [1, 3]] } else { [[3, 1], [-3, -1]] } }
+        Self { eighths: if y & 1 == 0 { [-1, -3] } else { [3, 1] } }
     }
 
     #[inline(always)]
     const fn of(self, x: usize) -> [i32; 2] {
-        let [even, odd] = self.eighths;
-        if x & 1 == 0 { even } else { odd }
+        let [across, down] = self.eighths;
+        if x & 1 == 0 { [across, down] } else { [across.wrapping_neg(), down.wrapping_neg()] }
     }
 }
 
@@ -90,10 +90,10 @@ impl Filter for Dither {
 
     #[inline(always)]
     fn offsets(self, width_log2: u32) -> [u32; 2] {
-        self.eighths.map(|[u, v]| {
-            let (across, down) = (u.wrapping_shl(29u32.wrapping_sub(width_log2)), v.wrapping_shl(fraction(width_log2).wrapping_sub(3)));
-            across.wrapping_add(down) as u32
-        })
+        let [u, v] = self.eighths;
+        let (across, down) = (u.wrapping_shl(29u32.wrapping_sub(width_log2)), v.wrapping_shl(fraction(width_log2).wrapping_sub(3)));
+        let even = across.wrapping_add(down) as u32;
+        [even, even.wrapping_neg()]
     }
 
     #[inline(always)]

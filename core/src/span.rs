@@ -53,8 +53,8 @@ pub struct Tiles<'t> {
 }
 
 impl Tiles<'_> {
-    /// Paints `out`, tiles of `PIXELS` pixels each. `window` gives the texels of that from some row on, in which `along` paints a line of pixels; `at`
-    /// paints one from anywhere in the picture. `by_fours`: `along` is so short that it is written out for four tiles at a time.
+    /// Paints `out`, tiles of `PIXELS` pixels each. `window` gives the texels of that from some row on, in which `along` paints a line of pixels; `pair`
+    /// tells an even and an odd one from anywhere in the picture, where they are `needed`. `by_fours`: `along` is so short that it is written out for four tiles at a time.
     #[inline(always)]
     pub fn paint<T: Copy, W: Copy, const PIXELS: usize>(
         &self,
@@ -62,7 +62,7 @@ impl Tiles<'_> {
         by_fours: bool,
         window: impl Fn(u16) -> Option<W>,
         along: impl Fn(W, &mut [T; PIXELS], Line<'_>),
-        at: impl Fn(PlayUv, usize) -> T,
+        pair: impl Fn(PlayUv, bool) -> [T; 2],
     ) {
         let blocks = out.as_chunks_mut::<PIXELS>().0;
         // The last tile may reach past the end.
@@ -74,7 +74,7 @@ impl Tiles<'_> {
             let Some(((here, others), (painted, unpainted))) = split else { return };
             (tiles, blocks) = (others, unpainted);
             let Some(window) = window(first.head.row()) else {
-                let [even, odd] = [0, 1].map(|x| at(self.backdrop, x));
+                let [even, odd] = pair(self.backdrop, first.is_plain());
                 for pixels in painted.iter_mut().filter(|_| first.is_plain()) {
                     *pixels = core::array::from_fn(|x| if x & 1 == 0 { even } else { odd });
                 }
@@ -124,19 +124,18 @@ pub fn by_turns<T, const WIDTH: u32, const ROWS: u32>(
     [even, odd]: [u32; 2],
     make: impl Fn(Packed<WIDTH, ROWS>) -> T,
 ) {
-    // It is further from even pixels to odd ones than back, by how far the offsets are apart, either way: an offset for each pixel would take an addition
-    // more.
+    // From each to the next of its turn it is two steps, which takes no addition more than from pixel to pixel: an offset for each pixel would.
     let apart = odd.wrapping_sub(even);
-    let (mut at, mut there, mut back) = (at.wrapping_add(even), step.wrapping_add(apart), step.wrapping_sub(apart));
+    let (mut at, mut step) = (at.wrapping_add(even), step);
     let (left, right) = pixels.split_at_mut(pixels.len() >> 1);
     for half in [left, right] {
+        let there = step.wrapping_add(apart);
         for [first, second] in half.as_chunks_mut::<2>().0 {
             *first = make(Packed(at));
-            at = at.wrapping_add(there);
-            *second = make(Packed(at));
-            at = at.wrapping_add(back);
+            *second = make(Packed(at.wrapping_add(there)));
+            at = at.wrapping_add(step.wrapping_mul(2));
         }
-        (there, back) = (there.wrapping_add(*bend), back.wrapping_add(*bend));
+        step = step.wrapping_add(*bend);
     }
 }
 

@@ -275,6 +275,18 @@ impl<C: Copy + Default> Colours for Colours8<'_, C> {
     }
 }
 
+/// The even and the odd pixel of a row at `uv`.
+#[inline(always)]
+fn pair<C: Colours, F: Filter<Colour = C::Colour>>(colours: &C, filter: F, uv: PlayUv) -> [u16; 2] {
+    [0, 1].map(|x| filter.at(uv, x, colours.texture(), |index| colours.colour(index)))
+}
+
+/// The same in a function of its own: written out in a row's loop, what takes long is worked out before that, for rows too that do not show it.
+#[inline(never)]
+fn pair_apart<C: Colours, F: Filter<Colour = C::Colour>>(colours: &C, filter: F, uv: PlayUv) -> [u16; 2] {
+    pair(colours, filter, uv)
+}
+
 /// A row of tiles, of colours of their windows' texels.
 #[inline(always)]
 fn paint<C: Colours, F: Filter<Colour = C::Colour>, W: Copy, const WIDTH: u32, const ROWS: u32>(
@@ -285,15 +297,19 @@ fn paint<C: Colours, F: Filter<Colour = C::Colour>, W: Copy, const WIDTH: u32, c
     window: impl Fn(u16) -> Option<W>,
     colour: impl Fn(W, usize) -> C::Colour,
 ) {
-    let at = |uv, x| filter.at(uv, x, colours.texture(), |index| colours.colour(index));
+    let pair = |uv, needed: bool| match (F::SHORT && F::REACH > 0, needed) {
+        (false, _) => pair(colours, filter, uv),
+        (true, true) => pair_apart(colours, filter, uv),
+        (true, false) => [0; 2],
+    };
     let along = |window: W, pixels: &mut [u16], line: Line<'_>| {
         filter.along(pixels, line, |at: Packed<WIDTH, ROWS>| filter.packed(at, |index| colour(window, index)));
     };
     // Pictures wider than 512 texels are rare.
     let by_fours = F::SHORT && C::BY_FOURS && WIDTH <= 9;
     match tiles.log2 {
-        3 => tiles.paint::<_, W, 8>(out, by_fours, window, |window, pixels, line| along(window, pixels, line), at),
-        _ => tiles.paint::<_, W, 4>(out, false, window, |window, pixels, line| along(window, pixels, line), at),
+        3 => tiles.paint::<_, W, 8>(out, by_fours, window, |window, pixels, line| along(window, pixels, line), pair),
+        _ => tiles.paint::<_, W, 4>(out, false, window, |window, pixels, line| along(window, pixels, line), pair),
     }
 }
 
