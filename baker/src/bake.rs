@@ -14,7 +14,7 @@ use crate::scene::Scene;
 use crate::sheets::{self, KeyGrid, Layers, Sheets};
 use crate::verify::VerifyError;
 use crate::walls;
-use crate::{cuts, order, prune, settle, spare, tears, timing};
+use crate::{brinks, cuts, order, prune, settle, spare, tears, timing};
 use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC};
 use std::time::Instant;
 use thiserror::Error;
@@ -293,6 +293,8 @@ pub fn settled(scene: &Scene, flat: &Flat, fitted: &Fitted, settings: &Settings,
     let &Settings { field_price, coverage, .. } = settings;
     let evidence = order::Evidence { gbuffer, grid, image, layers, fit, field_price, coverage };
     let fields = settle::settle(&evidence, &mut sheets);
+    let more = brinks::weights(&evidence, &sheets);
+    let fit = &Fit { uv: fit.uv.clone(), weight: fit.weight.iter().zip(more).map(|(weight, more)| weight + more).collect() };
     progress("coding keys", 0.8);
     let choice = settings.atlas.charts;
     let reason = || chart::reason(choice.family, choice.rewarped, choice.tried());

@@ -7,6 +7,7 @@ mod around;
 pub mod atlas;
 pub mod bake;
 pub mod bends;
+mod brinks;
 pub mod camera;
 pub mod cast;
 pub mod causes;

@@ -226,20 +226,25 @@ fn cost(right: [u8; 3], shown: [u8; 3]) -> u16 {
     (HIDDEN + (PIXEL - HIDDEN) * off / PLAIN).min(MOST * PIXEL) as u16
 }
 
+/// The same in pixels that are plainly wrong.
+pub(crate) fn off(right: [u8; 3], shown: [u8; 3]) -> f32 {
+    f32::from(cost(right, shown)) / PIXEL as f32
+}
+
 /// The rectangle of a chart, texels, and whether its outline tells more.
-struct Chart {
+pub(crate) struct Chart {
     rect: [f32; 4],
     masked: bool,
 }
 
 impl Chart {
-    fn new(image: &SourceImage, label: u8) -> Self {
+    pub fn new(image: &SourceImage, label: u8) -> Self {
         let label = &image.labels[usize::from(label)];
         Self { rect: label.rect.map(f32::from), masked: label.masked }
     }
 
     /// The player's chart test.
-    fn covers(&self, image: &SourceImage, [u, v]: [f32; 2]) -> bool {
+    pub fn covers(&self, image: &SourceImage, [u, v]: [f32; 2]) -> bool {
         let [left, top, right, bottom] = self.rect;
         u >= left && u < right && v >= top && v < bottom && (!self.masked || image.covered_at([u, v]))
     }
