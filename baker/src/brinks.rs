@@ -90,7 +90,7 @@ mod tests {
     /// The weights of a cell of 8 x 8 pixels in two frames, of which the upper left one shows the last column of chart 1, 16 texels wide, the others chart 2;
     /// the fitted positions of chart 1 are all so many texels `beyond` its edge.
     fn weights_of(beyond: f32, test: u16) -> Vec<f32> {
-        let own = |i: usize| i % 64 == 0;
+        let own = |i: usize| i.is_multiple_of(64);
         let uv: Vec<[f32; 2]> = (0..128).map(|i| if own(i) { [15.5, 4.5] } else { [20.5 + (i % 8) as f32, 4.5] }).collect();
         let gbuffer =
             GBuffer { width: 8, height: 8, frames: 2, label: (0..128).map(|i| if own(i) { 1 } else { 2 }).collect(), uv: uv.into() };

@@ -199,11 +199,11 @@ fn the_lowest_face_wins(baked: &Baked, _: &Figures) {
     assert!(both > 2000 && first == both, "the first face shows in {first} of {both} pixels");
 }
 
-/// Figures are those of the same scene in numbers near one.
+/// Figures are about those of the same scene in numbers near one: how dense texels are is told in eighths of an octave, which another scale shifts.
 fn as_good_as_at_home(_: &Baked, figures: &Figures) {
     let home = hard::case("town").expect("there is a town").baked().expect("it bakes");
     let home = hard::measure(&home.encoded.bundle, &home.flat.atlas).expect("it plays");
-    assert!((figures.psnr_mean - home.psnr_mean).abs() < 0.35, "{figures:?}, at home {home:?}");
+    assert!((figures.psnr_mean - home.psnr_mean).abs() < 0.5, "{figures:?}, at home {home:?}");
     assert!((figures.wrong_surface_percent - home.wrong_surface_percent).abs() < 0.1, "{figures:?}, at home {home:?}");
 }
 
