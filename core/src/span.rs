@@ -54,7 +54,8 @@ pub struct Tiles<'t> {
 
 impl Tiles<'_> {
     /// Paints `out`, tiles of `PIXELS` pixels each. `window` gives the texels of that from some row on, in which `along` paints a line of pixels; `pair`
-    /// tells an even and an odd one from anywhere in the picture, where they are `needed`. `by_fours`: `along` is so short that it is written out for four tiles at a time.
+    /// tells an even and an odd one at some place in the picture, where it is told that they are needed. `by_fours`: `along` is so short that it is
+    /// written out for four tiles at a time.
     #[inline(always)]
     pub fn paint<T: Copy, W: Copy, const PIXELS: usize>(
         &self,

@@ -28,8 +28,8 @@ pub struct Moment {
 }
 
 /// The weights `passed` frames into an interval of `lengths[1]` frames, between intervals of `lengths[0]` and `lengths[2]`
-/// (0: there is none). Held, those of the start up to the end. Cubic: a Hermite curve whose tangents are the secants over two intervals (Catmull and Rom 1974, for unequal intervals), or
-/// over the one where a key is missing.
+/// (0: there is none). Held: all of the key at the start, until the end is there. Cubic: a Hermite curve whose tangents are the secants over two
+/// intervals (Catmull and Rom 1974, for unequal intervals), or over the one where a key is missing.
 #[must_use]
 pub fn weights(time: u8, lengths: [u32; 3], passed: u32) -> WeightSet {
     // Q28 inside, rounded once at the end: at keys a power of two apart the weights are exact.
