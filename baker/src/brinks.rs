@@ -30,9 +30,8 @@ fn cell(evidence: &Evidence<'_>, sheets: &Sheets, index: usize) -> Vec<(usize, f
     let &Evidence { gbuffer, grid, image, fit, layers, .. } = evidence;
     let (interval, cell) = (index / grid.grid.cells(), index % grid.grid.cells());
     let list = &sheets.lists[index];
-    let tested = |place: usize| place + 1 < list.len() && sheets.tests[index] >> (2 * place) & 3 == CHART;
     let mut out = Vec::new();
-    for place in (0..list.len()).filter(|&place| tested(place)) {
+    for place in (0..list.len()).filter(|&place| sheets.test(index, place) == Some(CHART)) {
         let (label, chart) = (list[place], Chart::new(image, list[place]));
         let patch = Patch::new(grid, layers, [interval, cell], label, [grid.time, grid.space]);
         for frame in grid.frames_of(interval) {

@@ -87,8 +87,7 @@ pub(crate) fn distance(code: i8) -> f32 {
 
 /// Whether the sheet at a place in the list of a cell and interval is told by its fields.
 pub(crate) fn tests_field(sheets: &Sheets, index: usize, sheet: usize) -> bool {
-    // The last sheet passes without a test: there are no bits for the ninth.
-    sheet + 1 < sheets.lists[index].len() && sheets.tests[index] >> (2 * sheet) & 3 != CHART
+    sheets.test(index, sheet).is_some_and(|test| test != CHART)
 }
 
 /// What fields are fitted to.

@@ -211,6 +211,15 @@ pub fn find(gbuffer: &GBuffer, grid: &KeyGrid, least: u32) -> Sheets {
     Sheets { lists: found.into_iter().map(|list| list.into_iter().map(|(label, _)| label).collect()).collect(), tests, dropped }
 }
 
+impl Sheets {
+    /// The coverage test of the sheet at a place in the list of a cell and interval; `None` for the last, which passes without: there are no bits for
+    /// the ninth.
+    #[must_use]
+    pub fn test(&self, index: usize, sheet: usize) -> Option<u16> {
+        (sheet + 1 < self.lists[index].len()).then(|| self.tests[index] >> (2 * sheet) & 3)
+    }
+}
+
 /// The layers that nodes carry: for every key and node the labels of the cells around it, in the intervals that end
 /// and start at the key; ascending, as the player derives them.
 #[derive(Clone, Debug)]
