@@ -119,43 +119,52 @@ fn name(settings: &Settings) -> (u32, u32, u32, u8, u8) {
     (settings.cell, settings.key_interval, settings.coding.lambda.to_bits(), settings.time, settings.space)
 }
 
-/// The best settings that `steps` from `start` lead to, with their score: each step that scores more is taken at once and tried again, and the
-/// climb ends where none does or after `most` tries. `score` gives `None` for what cannot be had.
+/// Which of the steps that score more is taken.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Take {
+    /// The first, at once.
+    First,
+    /// The one that scores most: for steps that lead away from each other.
+    Most,
+}
+
+/// The best settings that `steps` from `start` lead to, with their score: what is taken of them is tried again, and the climb ends where no step scores
+/// more or after `most` tries. `score` gives `None` for what cannot be had.
 ///
 /// # Errors
 /// Those of `score`.
 pub(crate) fn climb(
     start: (Settings, f64),
     free: &Free,
-    steps: &[Step],
+    (take, steps): (Take, &[Step]),
     most: usize,
     mut score: impl FnMut(&Settings) -> Result<Option<f64>, BakeError>,
 ) -> Result<(Settings, f64), BakeError> {
     let mut best = start;
     let mut seen = vec![name(&start.0)];
     let mut order = steps.to_vec();
-    'climbing: loop {
-        for at in 0..order.len() {
-            let Some(next) = after(&best.0, order[at], free) else { continue };
-            if seen.contains(&name(&next)) {
-                continue;
-            }
+    loop {
+        let mut found: Option<(usize, (Settings, f64))> = None;
+        for (at, &step) in order.iter().enumerate() {
+            let Some(next) = after(&best.0, step, free).filter(|next| !seen.contains(&name(next))) else { continue };
             if seen.len() > most {
-                break 'climbing;
+                break;
             }
             seen.push(name(&next));
             if let Some(worth) = score(&next)?
-                && worth > best.1 + GAIN
+                && worth > found.map_or(best.1, |(_, (_, worth))| worth) + GAIN
             {
-                best = (next, worth);
-                // What helped once may well help again.
-                order[..=at].rotate_right(1);
-                continue 'climbing;
+                found = Some((at, (next, worth)));
+                if take == Take::First {
+                    break;
+                }
             }
         }
-        break;
+        let Some((at, next)) = found else { return Ok(best) };
+        best = next;
+        // What helped once may well help again.
+        order[..=at].rotate_right(1);
     }
-    Ok(best)
 }
 
 #[cfg(test)]
@@ -181,10 +190,10 @@ mod tests {
         };
         let start = Settings::default();
         let worth = height(&start).unwrap().unwrap();
-        let (top, best) = climb((start, worth), &ALL, &Step::ALL, 60, height).unwrap();
+        let (top, best) = climb((start, worth), &ALL, (Take::First, &Step::ALL), 60, height).unwrap();
         assert_eq!((name(&top), best > -1e-6), ((4, 3, 0.1f32.to_bits(), TIME_LINEAR, start.space), true));
         let held = Free { cell: false, time: false, ..ALL };
-        let (top, _) = climb((start, worth), &held, &Step::ALL, 60, height).unwrap();
+        let (top, _) = climb((start, worth), &held, (Take::First, &Step::ALL), 60, height).unwrap();
         assert_eq!(name(&top), (start.cell, 3, 0.1f32.to_bits(), start.time, start.space));
         // No more tries than allowed, and nothing where nothing is to be had.
         let mut tries = 0;
@@ -192,7 +201,7 @@ mod tests {
             tries += 1;
             Ok(None)
         };
-        let (same, _) = climb((start, worth), &ALL, &Step::ALL, 5, counted).unwrap();
+        let (same, _) = climb((start, worth), &ALL, (Take::First, &Step::ALL), 5, counted).unwrap();
         assert_eq!((name(&same), tries), (name(&start), 5));
     }
 
@@ -200,7 +209,23 @@ mod tests {
     fn intervals_stay_shorter_than_the_path() {
         let start = Settings { key_interval: 6, ..Settings::default() };
         let longest = |s: &Settings| Ok(Some(f64::from(s.key_interval)));
-        let (top, _) = climb((start, 6.0), &Free { frames: 13, cell: false, ..ALL }, &Step::ALL, 60, longest).unwrap();
+        let (top, _) = climb((start, 6.0), &Free { frames: 13, cell: false, ..ALL }, (Take::First, &Step::ALL), 60, longest).unwrap();
         assert_eq!(top.key_interval, 12);
+    }
+
+    #[test]
+    fn of_steps_that_lead_apart_the_better_one_is_taken() {
+        // A low hill that the first step leads to, a higher one that the second does.
+        let height = |s: &Settings| {
+            Ok(Some(match (s.cell, s.key_interval) {
+                (16, 4) => 1.0,
+                (8, 4) => 2.0,
+                (8, 2) => 3.0,
+                _ => 0.0,
+            }))
+        };
+        let steps = [Step::COARSER, Step::HALF];
+        let top = |take| climb((Settings::default(), 0.0), &ALL, (take, &steps), 4, height).map(|(top, _)| (top.cell, top.key_interval));
+        assert_eq!((top(Take::First).unwrap(), top(Take::Most).unwrap()), ((16, 4), (8, 2)));
     }
 }

@@ -4,7 +4,7 @@
 //! cells twice as large besides, in less memory. A bundle baked as usual comes from `job`; the best of a few goes back.
 
 use crate::bake::{BakeError, Flat, Progress, Settings};
-use crate::climb::{Free, Step, climb};
+use crate::climb::{Free, Step, Take, climb};
 use crate::made::Made;
 use crate::scene::Scene;
 use crate::seen::Seen;
@@ -68,21 +68,21 @@ pub(crate) fn crossed(quality: &Brief) -> bool {
     quality.wrong_surface_percent >= TORN && quality.path_error_texels.p99 < BENT
 }
 
-/// Steps to climb by, and how many tries they get.
-type Climb = (&'static [Step], usize);
+/// Steps to climb by, which of them is taken, and how many tries they get.
+type Climb = (Take, &'static [Step], usize);
 
 /// The climbs worth a try after cells of `cell` pixels gave `quality`, each if those before it lead nowhere, on a path that is `brief` or not; and why.
 fn climbs(cell: u32, quality: &Brief, brief: bool) -> Option<(&'static [Climb], &'static str)> {
     // Smaller cells are there for the picture: keys still farther apart would take that back.
-    const FINER: Climb = (&[Step::FINER], 1);
-    const FARTHER: Climb = (&[Step::DOUBLE], 1);
-    const FAR: Climb = (&[Step::DOUBLE], 2);
-    const CLOSER: Climb = (&[Step::COARSER, Step::HALF], BENT_TRIES);
-    const CLOSE: Climb = (&[Step::HALF, Step::CLOSER], 2);
-    const FASTER: Climb = (&[Step::HALF], BENT_TRIES);
+    const FINER: Climb = (Take::First, &[Step::FINER], 1);
+    const FARTHER: Climb = (Take::First, &[Step::DOUBLE], 1);
+    const FAR: Climb = (Take::First, &[Step::DOUBLE], 2);
+    const CLOSER: Climb = (Take::Most, &[Step::COARSER, Step::HALF], BENT_TRIES);
+    const CLOSE: Climb = (Take::First, &[Step::HALF, Step::CLOSER], 2);
+    const FASTER: Climb = (Take::First, &[Step::HALF], BENT_TRIES);
     // Where a camera shakes, keys twice as close hit no more of it.
-    const FASTEST: Climb = (&[Step::HALF, Step::EIGHTH], BENT_TRIES);
-    const BRIEFLY: Climb = (&[Step::HALF, Step::COARSER, Step::CLOSER], BENT_TRIES);
+    const FASTEST: Climb = (Take::First, &[Step::HALF, Step::EIGHTH], BENT_TRIES);
+    const BRIEFLY: Climb = (Take::First, &[Step::HALF, Step::COARSER, Step::CLOSER], BENT_TRIES);
     let (torn, bent) = (quality.wrong_surface_percent >= TORN, quality.path_error_texels.p99);
     let climbs: &[Climb] = match torn {
         true if (bent < STEADY || cell > USUAL) && brief => &[FINER, FARTHER, FASTEST],
@@ -164,10 +164,10 @@ pub(crate) fn choose(
     let closest = if brief { 1 } else { CLOSEST.min((stand.key_interval / 2).max(1)) };
     let free = Free { cell: true, interval: true, lambda: false, time: false, space: false, frames: scene.playback.frames };
     let mut better: Option<(f64, Made)> = None;
-    let most: usize = climbs.iter().map(|(_, tries)| tries).sum();
+    let most: usize = climbs.iter().map(|(.., tries)| tries).sum();
     let mut tried = 0;
-    for &(steps, tries) in climbs {
-        climb((stand, 0.0), &free, steps, tries, |settings| {
+    for &(take, steps, tries) in climbs {
+        climb((stand, 0.0), &free, (take, steps), tries, |settings| {
             let closer = settings.key_interval < usual.settings.key_interval && all.path_error_texels.p99 < BENT;
             if closer && settings.key_interval < closest {
                 return Ok(None);

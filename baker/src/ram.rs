@@ -5,7 +5,7 @@
 //! straight, and fewer layers in either where cells are larger. What each of these loses differs from scene to scene: it is measured.
 
 use crate::bake::{BakeError, Encoded, Flat, Settings};
-use crate::climb::{Free, Step, climb};
+use crate::climb::{Free, Step, Take, climb};
 use crate::encode::{image_bytes, with_section};
 use crate::inspect::{space_name, time_name};
 use crate::job::{Chosen, Whole};
@@ -139,7 +139,7 @@ impl Search<'_> {
     fn refine(&self, flat: &Flat, start: (Settings, f64), room: usize, found: &mut Found) -> Result<(), BakeError> {
         let free = Free { lambda: false, ..self.free() };
         let mut step = 0;
-        climb(start, &free, &Step::ALL, STEPS, |settings| {
+        climb(start, &free, (Take::First, &Step::ALL), STEPS, |settings| {
             self.say(step, STEPS);
             step += 1;
             let Some(tried) = self.attempt(flat, *settings, found)?.filter(|tried| tried.memory <= room) else { return Ok(None) };

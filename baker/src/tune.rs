@@ -5,7 +5,7 @@
 use crate::atlas::{self, Storage};
 use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings, Sparing};
 use crate::cast::Cast;
-use crate::climb::{Free, Step, climb};
+use crate::climb::{Free, Step, Take, climb};
 use crate::encode::{self, image_bytes};
 use crate::job::{self, Chosen, Goal, Options, Whole};
 use crate::metrics;
@@ -294,7 +294,7 @@ impl Search<'_> {
         // Coarser coding is what makes a bundle fit.
         let free = Free { lambda: false, time: false, space: false, ..self.free() };
         let mut step = steps - STEPS;
-        let (settings, found) = climb(start, &free, &Step::ALL, STEPS, |settings| {
+        let (settings, found) = climb(start, &free, (Take::First, &Step::ALL), STEPS, |settings| {
             self.say(step, steps);
             step += 1;
             score(&flat, settings, false)
@@ -360,7 +360,7 @@ impl Search<'_> {
             }
             let Some(start) = best else { break };
             let most = if turn == 0 || start.1 > REACHED / 2.0 { STEPS } else { 0 };
-            let (settings, found) = climb(start, &free, &Step::ALL, most, |settings| score(&flat, settings, false))?;
+            let (settings, found) = climb(start, &free, (Take::First, &Step::ALL), most, |settings| score(&flat, settings, false))?;
             best = Some((settings, found));
             if found > REACHED / 2.0 {
                 let coarser = (turn > 0).then(|| {
@@ -452,10 +452,11 @@ mod tests {
             bake_scene(&scene, &options, &|_, _| {})
         };
         let (plain, report) = bake_scene(&scene, &Options::default(), &|_, _| {}).unwrap();
-        let reached = report.quality.psnr_mean;
+        let (reached, keys) = (report.quality.psnr_mean, report.bytes.keys);
         let (bytes, report) = bake(reached - 1.0).unwrap();
+        // Either leaves out sheets at its own quality, which is a matter of some bytes of keys.
         assert!(
-            report.quality.psnr_mean >= reached - 1.0 && bytes.len() <= plain.len(),
+            report.quality.psnr_mean >= reached - 1.0 && bytes.len() <= plain.len() + keys / 10,
             "{reached} {} dB, {} {} bytes, {:?}",
             report.quality.psnr_mean,
             plain.len(),
