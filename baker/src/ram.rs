@@ -215,6 +215,7 @@ mod tests {
     use crate::report::Report;
     use crate::scene::{Scene, builtin};
     use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC};
+    use std::sync::OnceLock;
 
     fn small() -> Scene {
         let mut scene = builtin::build("cone-orbit").unwrap();
@@ -231,6 +232,12 @@ mod tests {
         Ok((memory, bytes, report))
     }
 
+    /// What is baked where nothing is asked for.
+    fn plain() -> &'static (usize, Vec<u8>) {
+        static PLAIN: OnceLock<(usize, Vec<u8>)> = OnceLock::new();
+        PLAIN.get_or_init(|| bake(None, Options::default()).map(|(memory, bytes, _)| (memory, bytes)).unwrap())
+    }
+
     fn kind(bytes: &[u8]) -> (u8, u8, u8) {
         let bundle = Bundle::parse(bytes).unwrap();
         (bundle.path().time, bundle.path().space, bundle.path().cell_log2)
@@ -238,21 +245,21 @@ mod tests {
 
     #[test]
     fn what_fits_is_left_as_it_is() {
-        let (memory, plain, _) = bake(None, Options::default()).unwrap();
-        let (_, bytes, report) = bake(Some(memory), Options::default()).unwrap();
-        assert!(bytes == plain && report.warnings.iter().all(|warning| !warning.contains("--ram")), "{:?}", report.warnings);
+        let (memory, plain) = plain();
+        let (_, bytes, report) = bake(Some(*memory), Options::default()).unwrap();
+        assert!(bytes == *plain && report.warnings.iter().all(|warning| !warning.contains("--ram")), "{:?}", report.warnings);
         // A byte less, and something has to go: the cheapest loss, with its price.
         let (less, bytes, report) = bake(Some(memory - 1), Options::default()).unwrap();
         let warning = report.warnings.iter().find(|warning| warning.contains("--ram")).unwrap();
-        assert!(less < memory && bytes != plain && warning.contains(&grouped(memory)) && warning.contains("dB"), "{warning}");
+        assert!(less < *memory && bytes != *plain && warning.contains(&grouped(*memory)) && warning.contains("dB"), "{warning}");
     }
 
     #[test]
     fn an_unpacked_picture_counts() {
-        let (raw, ..) = bake(None, Options::default()).unwrap();
+        let (raw, _) = plain();
         let storage = Some(Storage::Packed);
         let (packed, _, report) = bake(None, Options { storage, ..Options::default() }).unwrap();
-        assert!(report.memory.picture > 0 && packed == raw + report.memory.picture, "{packed} {raw}");
+        assert!(report.memory.picture > 0 && packed == *raw + report.memory.picture, "{packed} {raw}");
         // What would do for a raw one does not: something else has to go, for the picture was asked for.
         let (_, _, report) = bake(Some(packed - 1), Options { storage, ..Options::default() }).unwrap();
         assert!(report.source_image.storage == Storage::Packed && report.warnings.iter().any(|warning| warning.contains("--ram")));
@@ -275,8 +282,7 @@ mod tests {
 
     #[test]
     fn larger_cells_come_when_straight_lines_do_not_do() {
-        let (_, curved, _) = bake(None, Options::default()).unwrap();
-        let straight = memory_as(&curved, TIME_LINEAR, SPACE_LINEAR).unwrap();
+        let straight = memory_as(&plain().1, TIME_LINEAR, SPACE_LINEAR).unwrap();
         let (_, bytes, report) = bake(Some(straight * 9 / 10), Options::default()).unwrap();
         assert!(kind(&bytes).2 > 3 && report.grid.cell > 8, "{:?}", kind(&bytes));
         assert!(report.warnings.iter().any(|warning| warning.contains("instead of 8")), "{:?}", report.warnings);
