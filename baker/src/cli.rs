@@ -170,8 +170,8 @@ pub struct Bake {
     ///
     /// Bars, railings and leaves about as thin as a texel want finer outlines than texels. They take as much flash as a quarter (2) to as much as all of
     /// the texels (4) where most of a picture is such, next to nothing where charts are large; nothing else changes. Lattices gain 1 to 3 dB, bodies of
-    /// few outlines nothing. Auto tries them where many outlines cross the picture, and takes what is worth its bytes: twice the bundle has to bring 1.55 dB. --budget and
-    /// --psnr take 1.
+    /// few outlines nothing. Auto tries them where many outlines cross the picture, and takes what is worth its bytes: twice the bundle has to bring 1.55 dB.
+    /// --budget takes them where there is room; --psnr takes 1.
     #[arg(long, value_enum, value_name = "BITS", default_value_t = Outlines::Auto)]
     pub outline: Outlines,
     /// Every Nth key needs no earlier one: a seek decodes at most N + 3 keys, N + 1 where time is straight or held.

@@ -231,9 +231,9 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
         }
         whole = Some(Whole { settings: baked.settings, memory, psnr: baked.psnr_before });
     }
-    // What outlines need of it, flash has. Only where nothing is searched for are finer ones tried.
+    // What outlines need of it, flash has. Where memory or quality is searched for no finer ones are tried.
     let outline = whole.map_or(options.source.outline, |whole| whole.settings.atlas.outline);
-    let outline = if options.goal == Goal::AsSet { outline } else { outline.or(Some(0)) };
+    let outline = if matches!(options.goal, Goal::AsSet | Goal::Budget(_)) { outline } else { outline.or(Some(0)) };
     let options = &Options { source: atlas::Settings { outline, ..options.source }, ..*options };
     let choice_seconds = start.elapsed().as_secs_f64();
     let settings = options.settings(scene.playback.width);
@@ -261,11 +261,8 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
     let quality = verify::briefly(&encoded.bundle, &flat.atlas.image, &flat.atlas.gbuffer)?;
     let free = options.goal == Goal::AsSet && options.cell.is_none() && options.key_interval.is_none();
     let made = Made { settings, encoded, quality };
-    // Where something is searched for, the source image has no others.
-    let (made, outlines) = match fitted {
-        Some(fitted) => outlines::choose(scene, &mut flat, &fitted, made, progress)?,
-        None => (made, Vec::new()),
-    };
+    let budget = if let Goal::Budget(budget) = options.goal { Some(budget) } else { None };
+    let (made, outlines) = outlines::choose(scene, &mut flat, fitted, made, budget, progress)?;
     let all = made.quality;
     // Searches have left out what they could.
     let prunes = !options.all_sheets && options.goal == Goal::AsSet;

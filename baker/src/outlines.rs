@@ -2,7 +2,7 @@
 //! each way may show more for the bytes. A bundle baked as usual comes from `job`; the best goes back. Lattices and foliage gain 1 to 3 dB.
 
 use crate::atlas::Outline;
-use crate::bake::{BakeError, Fitted, Flat, Progress};
+use crate::bake::{self, BakeError, Fitted, Flat, Progress};
 use crate::finer;
 use crate::made::Made;
 use crate::metrics;
@@ -33,33 +33,37 @@ impl Trial {
 }
 
 /// `usual`, or what is made of the scene with a finer outline if that is worth more, which `flat` then has; and all that were tried, the finest last:
-/// one that is worth less than the one before is the last. `fitted`: what `usual` came from.
+/// one that is worth less than the one before is the last. Within a `budget` of bytes quality alone counts. `fitted`: what `usual` came from, if that
+/// is at hand.
 ///
 /// # Errors
 /// Those of encoding, and of the player.
 pub(crate) fn choose(
     scene: &Scene,
     flat: &mut Flat,
-    fitted: &Fitted,
+    fitted: Option<Fitted>,
     usual: Made,
+    budget: Option<u64>,
     progress: Progress<'_>,
 ) -> Result<(Made, Vec<Trial>), BakeError> {
     let finer = std::mem::take(&mut flat.atlas.finer);
     if finer.is_empty() || !finer::crossed(&usual.quality) {
         return Ok((usual, Vec::new()));
     }
+    let fitted = fitted.map_or_else(|| bake::fitted(scene, flat, &usual.settings, progress), Ok)?;
     let mut trials = vec![Trial::new(&flat.atlas.image.outline, &usual)];
-    let (count, mut best) = (finer.len(), (trials[0].worth(), flat.atlas.image.outline.clone(), usual));
+    let worth = |trial: &Trial| if budget.is_some() { trial.psnr } else { trial.worth() };
+    let (count, mut best) = (finer.len(), (worth(&trials[0]), flat.atlas.image.outline.clone(), usual));
     for (done, outline) in finer.into_iter().enumerate() {
         progress("trying outlines", done as f64 / count as f64);
         let mut settings = best.2.settings;
         settings.atlas.outline = Some(outline.finer);
         flat.atlas.image.outline = outline.clone();
-        let made = Made::of(scene, flat, fitted, settings)?;
+        let made = Made::of(scene, flat, &fitted, settings)?;
         let trial = Trial::new(&outline, &made);
-        let worth = trial.worth();
+        let (worth, fits) = (worth(&trial), budget.is_none_or(|budget| trial.bytes as u64 <= budget));
         trials.push(trial);
-        if worth <= best.0 {
+        if worth <= best.0 || !fits {
             break;
         }
         best = (worth, outline, made);
@@ -82,27 +86,31 @@ pub fn reason(trials: &[Trial]) -> String {
 mod tests {
     use super::*;
     use crate::atlas;
-    use crate::bake::{self, Coverage, Settings};
+    use crate::bake::{Coverage, Settings};
     use crate::chart::Family;
     use crate::scene::builtin;
     use cubist_core::format::SPACE_LINEAR;
 
-    fn chosen(name: &str, settings: Settings) -> (u32, Flat, Made, Vec<Trial>) {
+    fn chosen(name: &str, settings: Settings, budget: Option<u64>) -> (u32, Flat, Made, Vec<Trial>) {
         let mut scene = builtin::build(name).unwrap();
         (scene.playback.width, scene.playback.height, scene.playback.frames) = (64, 48, 17);
         let mut flat = bake::flatten(&scene, &settings.atlas, &|_, _| {}).unwrap();
         let fitted = bake::fitted(&scene, &flat, &settings, &|_, _| {}).unwrap();
         let usual = Made::of(&scene, &flat, &fitted, settings).unwrap();
-        let (made, trials) = choose(&scene, &mut flat, &fitted, usual, &|_, _| {}).unwrap();
+        let (made, trials) = choose(&scene, &mut flat, Some(fitted), usual, budget, &|_, _| {}).unwrap();
         (flat.atlas.image.outline.finer, flat, made, trials)
+    }
+
+    /// Stones seen so small that many stand in every cell, told by their charts alone.
+    fn stones(budget: Option<u64>) -> (u32, Flat, Made, Vec<Trial>) {
+        let source = atlas::Settings { charts: Family::Sight.into(), ..atlas::Settings::default() };
+        let settings = Settings { key_interval: 4, space: SPACE_LINEAR, atlas: source, coverage: Coverage::Chart, ..Settings::default() };
+        chosen("pivot", settings, budget)
     }
 
     #[test]
     fn what_stands_close_is_outlined_finely() {
-        // Stones seen so small that many stand in every cell, told by their charts alone.
-        let source = atlas::Settings { charts: Family::Sight.into(), ..atlas::Settings::default() };
-        let settings = Settings { key_interval: 4, space: SPACE_LINEAR, atlas: source, coverage: Coverage::Chart, ..Settings::default() };
-        let (finer, flat, made, trials) = chosen("pivot", settings);
+        let (finer, flat, made, trials) = stones(None);
         assert!(trials.len() == 3 && trials.iter().map(|trial| trial.bits).eq([1, 2, 4]), "{}", reason(&trials));
         let best = trials.iter().map(Trial::worth).fold(f64::NEG_INFINITY, f64::max);
         let trial = &trials[finer as usize];
@@ -111,8 +119,19 @@ mod tests {
     }
 
     #[test]
+    fn a_budget_bounds_them_and_counts_no_bytes_within() {
+        let (finest, _, _, trials) = stones(Some(1 << 20));
+        let most = trials.iter().map(|trial| trial.psnr).fold(f64::NEG_INFINITY, f64::max);
+        assert!(trials.len() == 3 && trials[finest as usize].psnr == most, "{}", reason(&trials));
+        let (finer, _, made, tried) = stones(Some(trials[1].bytes as u64));
+        assert!(finer == 1 && made.encoded.bundle.len() == trials[1].bytes && tried == trials, "{}", reason(&tried));
+        let (usual, _, made, _) = stones(Some(trials[0].bytes as u64));
+        assert!(usual == 0 && made.encoded.bundle.len() == trials[0].bytes);
+    }
+
+    #[test]
     fn few_outlines_stay_as_they_are() {
-        let (finer, _, _, trials) = chosen("pyramid", Settings::default());
+        let (finer, _, _, trials) = chosen("pyramid", Settings::default(), None);
         assert!(finer == 0 && trials.is_empty());
     }
 }
