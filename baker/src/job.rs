@@ -311,7 +311,10 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
     };
     let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings, spaces, bends, outlines, repainted };
     let mut report = Report::new(&origin, &inspection, quality, truth, work, seconds);
-    report.warnings.extend(warnings.into_iter().chain(finer));
+    // By what it takes with the outline that was chosen for it.
+    let packed = budget.filter(|_| settings.atlas.storage != options.source().storage);
+    let packed = packed.map(|budget| tune::packed(budget, report.memory.picture));
+    report.warnings.extend(warnings.into_iter().chain(packed).chain(finer));
     Ok(Baked { bundle: encoded.bundle, report, flat, settings, psnr_before })
 }
 

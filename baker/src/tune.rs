@@ -6,7 +6,7 @@ use crate::atlas::{self, Storage};
 use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings, Sparing};
 use crate::cast::Cast;
 use crate::climb::{Free, Step, Take, climb};
-use crate::encode::{self, image_bytes};
+use crate::encode::image_bytes;
 use crate::job::{self, Chosen, Goal, Options, Whole};
 use crate::metrics;
 use crate::repaint::Painter;
@@ -302,15 +302,7 @@ impl Search<'_> {
         if found < 0.0 {
             return Err(BakeError::Budget { budget, smallest });
         }
-        let packed = (settings.atlas.storage != self.options.source().storage).then(|| {
-            let image = &flat.atlas.image;
-            format!(
-                "--budget {budget}: the source image is packed to fit, and takes {} bytes of memory unpacked; --storage raw keeps it in flash, \
-                 at lower quality",
-                grouped(encode::raw_bytes(image))
-            )
-        });
-        self.finish(flat, settings, packed.into_iter().collect())
+        self.finish(flat, settings, Vec::new())
     }
 
     /// The smallest bundle whose mean PSNR against exact rays reaches `asked`.
@@ -377,6 +369,14 @@ impl Search<'_> {
     }
 }
 
+/// What the user should know where the source image is packed for the sake of `budget`, and takes so many bytes of memory.
+pub(crate) fn packed(budget: u64, memory: usize) -> String {
+    format!(
+        "--budget {budget}: the source image is packed to fit, and takes {} bytes of memory unpacked; --storage raw keeps it in flash, at lower quality",
+        grouped(memory)
+    )
+}
+
 /// What came of an attempt; `None` where a bundle cannot hold it: that ends the attempt, not the search. The first to exceed
 /// a bound is remembered.
 pub(crate) fn possible<T>(attempt: Result<T, BakeError>, exceeded: &mut Option<BakeError>) -> Result<Option<T>, BakeError> {
@@ -434,6 +434,8 @@ mod tests {
             "{:?}",
             open.warnings
         );
+        let takes = format!("takes {} bytes of memory", grouped(open.memory.picture));
+        assert!(open.warnings.iter().any(|warning| warning.contains(&takes)), "{:?}", open.warnings);
         assert!(open.memory.picture == open.source_image.raw_bytes && open.source_image.stored_bytes < open.source_image.raw_bytes);
         let (_, raw) = bake(tight, Some(Storage::Raw));
         assert!(raw.source_image.storage == Storage::Raw && raw.memory.picture == 0 && !told(&raw));
