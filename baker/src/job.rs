@@ -2,7 +2,7 @@
 //! The stages are `bake`'s, the search is `tune`'s, the figures are `verify`'s.
 
 use crate::atlas::{self, Storage};
-use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings, Sparing};
+use crate::bake::{self, BakeError, Encoded, Fitted, Flat, Progress, Settings};
 use crate::bends::Bends;
 use crate::cast::Cast;
 use crate::chart::{self, Choice, Family};
@@ -11,6 +11,7 @@ use crate::fewer;
 use crate::finer;
 use crate::inspect::Inspection;
 use crate::made::Made;
+use crate::options::{Goal, Options, TruthFrames};
 use crate::outlines;
 use crate::repaint::Painter;
 use crate::report::{Origin, Report, Seconds};
@@ -19,145 +20,11 @@ use crate::seen::Seen;
 use crate::straight;
 use crate::trace::Tracer;
 use crate::truth::{Truth, spread};
-use crate::{tune, verify};
+use crate::{tune, usual, verify};
 use std::time::Instant;
 
-/// Screens wider than this get cells of 16 pixels unless told otherwise.
-const WIDE: u32 = 640;
 /// Keys that trials of charts have, at least, on paths with as many frames; on brief ones twice as many.
 const TRIAL_KEYS: u32 = 16;
-
-/// What the bundle is to reach.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Goal {
-    /// What the settings give.
-    #[default]
-    AsSet,
-    /// At most this many bytes, at the best quality that fits.
-    Budget(u64),
-    /// The fewest bytes with at least this mean PSNR, dB, against exact ray casting.
-    Psnr(f64),
-    /// At most this many bytes of working memory for playing, at the best quality that fits.
-    Ram(usize),
-}
-
-/// The frames to compare with the antialiased scene.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TruthFrames {
-    /// None.
-    None,
-    /// At most this many, evenly spread.
-    Most(u32),
-    /// All.
-    All,
-}
-
-/// What the user asks of a bundle.
-#[derive(Clone, Copy, Debug)]
-pub struct Options {
-    /// Side of a cell, pixels; `None`: the baker chooses.
-    pub cell: Option<u32>,
-    /// Frames between keys; `None`: the baker chooses.
-    pub key_interval: Option<u32>,
-    /// How layers are interpolated between keys: one of the format's `TIME_` numbers; `None`: the baker chooses.
-    pub time: Option<u8>,
-    /// How they are interpolated between nodes: one of the format's `SPACE_` numbers; `None`: the baker chooses.
-    pub space: Option<u8>,
-    /// Keys stand at even intervals, not where they are needed most.
-    pub even_keys: bool,
-    /// The source image; a search may make it coarser.
-    pub source: atlas::Settings,
-    /// What its detail is worth, in place of `source.detail`; `None`: as that says, but a search for a budget may keep all of it.
-    pub detail: Option<f64>,
-    /// How the bundle holds it, in place of `source.storage`; `None`: as that says, but a search for a budget may pack it.
-    pub storage: Option<Storage>,
-    /// How the surface is cut and flattened, in place of `source.charts`; `None`: the baker tries.
-    pub charts: Option<Choice>,
-    /// Whether texels move inside charts to where their detail is seen; `None`: the baker tries, where it tries charts.
-    pub rewarp: Option<bool>,
-    /// What a bit of the keys is worth, as [`Settings::coding`] has it; `None`: as much as hardly shows.
-    pub lambda: Option<f32>,
-    /// Every this many keys one that needs no earlier one.
-    pub independent_every: usize,
-    /// Keeps sheets that take more than what they show is worth.
-    pub all_sheets: bool,
-    /// Texels keep the colours of what lies there, whatever playback makes of them.
-    pub plain: bool,
-    /// What to reach.
-    pub goal: Goal,
-    /// How much is compared with the truth.
-    pub truth: TruthFrames,
-    /// Seconds that reading the scene took, for the report.
-    pub load_seconds: f64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            cell: None,
-            key_interval: None,
-            time: None,
-            space: None,
-            even_keys: false,
-            source: atlas::Settings::default(),
-            detail: None,
-            storage: None,
-            charts: None,
-            rewarp: None,
-            lambda: None,
-            independent_every: Settings::default().coding.independent_every,
-            all_sheets: false,
-            plain: false,
-            goal: Goal::AsSet,
-            truth: TruthFrames::Most(16),
-            load_seconds: 0.0,
-        }
-    }
-}
-
-impl Options {
-    /// The settings for a screen `width` pixels wide, the baker's choices filled in.
-    #[must_use]
-    pub fn settings(&self, width: u32) -> Settings {
-        let mut settings = Settings { atlas: self.source(), ..Settings::default() };
-        settings.coding.independent_every = self.independent_every;
-        settings.coding.lambda = self.lambda.unwrap_or(settings.coding.lambda);
-        // The other searches look for what a bit is worth themselves.
-        let spares = self.lambda.is_none() && matches!(self.goal, Goal::AsSet | Goal::Ram(_));
-        settings.sparing = if spares { Sparing::Unseen } else { Sparing::Nothing };
-        settings.cell = self.cell.unwrap_or(if width > WIDE { 16 } else { settings.cell });
-        settings.key_interval = self.key_interval.unwrap_or(settings.key_interval);
-        settings.time = self.time.unwrap_or(settings.time);
-        settings.space = self.space.unwrap_or(settings.space);
-        settings.adapt_keys = !self.even_keys;
-        settings
-    }
-
-    /// The source image, stored as asked for.
-    #[must_use]
-    pub fn source(&self) -> atlas::Settings {
-        atlas::Settings {
-            detail: self.detail.unwrap_or(self.source.detail),
-            storage: self.storage.unwrap_or(self.source.storage),
-            charts: self.charts.unwrap_or(self.source.charts),
-            ..self.source
-        }
-    }
-
-    /// What else helps where a search finds nothing: to leave to it what is given; nothing where nothing is. `cells`: the search would try other
-    /// cells than the one that is given.
-    pub(crate) fn held(&self, cells: bool) -> String {
-        let all = [
-            (cells && self.cell.is_some(), "--cell"),
-            (self.key_interval.is_some(), "--key-interval"),
-            (!cells && self.time.is_some(), "--time"),
-            (!cells && self.space.is_some(), "--space"),
-            (!cells && self.storage == Some(Storage::Packed), "--storage"),
-        ];
-        let given: Vec<&str> = all.into_iter().filter_map(|(given, name)| given.then_some(name)).collect();
-        if given.is_empty() { String::new() } else { format!(", or leave {} to the search", given.join(" and ")) }
-    }
-}
 
 /// A finished job.
 pub struct Baked {
@@ -171,6 +38,8 @@ pub struct Baked {
     pub settings: Settings,
     /// Mean PSNR against exact rays before texels were coloured by what is played, dB.
     pub(crate) psnr_before: f64,
+    /// Whether the search that found it leaves room for what is baked where nothing is asked for: how that has to be stored.
+    pub(crate) contested: Option<Storage>,
 }
 
 /// What was chosen: by the settings or by a search.
@@ -182,6 +51,8 @@ pub(crate) struct Chosen {
     pub search_seconds: f64,
     /// What the user should know about the choice.
     pub warnings: Vec<String>,
+    /// Whether the search leaves room for what is baked where nothing is asked for: how that has to be stored.
+    pub contested: Option<Storage>,
 }
 
 /// A bundle that needs more memory than there is.
@@ -217,88 +88,66 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
 
 /// Like [`run`], of a scene whose rays `tracer` casts.
 fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<Baked, BakeError> {
-    let (start, scene) = (Instant::now(), tracer.scene());
+    let start = Instant::now();
     let choice = choice(tracer, options, progress)?;
+    let choice_seconds = start.elapsed().as_secs_f64();
     let options = &Options { charts: Some(choice), ..*options };
-    // What needs no more memory than there is stays as it is; where it cannot be had at all, the search says why.
-    let mut whole = None;
-    if let Goal::Ram(room) = options.goal
-        && let Ok(baked) = by(tracer, &Options { goal: Goal::AsSet, ..*options }, progress)
-    {
-        let memory = baked.report.memory.workspace;
-        if memory <= room {
-            return Ok(baked);
-        }
-        whole = Some(Whole { settings: baked.settings, memory, psnr: baked.psnr_before });
+    let mut baked = toward(tracer, options, progress)?;
+    baked.report.seconds.search += choice_seconds;
+    baked.report.seconds.total += choice_seconds;
+    Ok(baked)
+}
+
+/// Like [`by`], of charts that are chosen. What is baked where nothing is asked for is the answer where it is as good a one.
+fn toward(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<Baked, BakeError> {
+    let usual = |storage| once(tracer, &Options { goal: Goal::AsSet, storage, ..*options }, None, progress);
+    match options.goal {
+        Goal::AsSet => once(tracer, options, None, progress),
+        // What needs no more memory than there is stays as it is; where it cannot be had at all, the search says why.
+        Goal::Ram(room) => match usual(options.storage) {
+            Ok(baked) if baked.report.memory.workspace <= room => Ok(baked),
+            Ok(Baked { settings, report, psnr_before: psnr, .. }) => {
+                once(tracer, options, Some(Whole { settings, memory: report.memory.workspace, psnr }), progress)
+            }
+            Err(_) => once(tracer, options, None, progress),
+        },
+        _ => usual::or_found(options, &Seen::new(tracer, None), once(tracer, options, None, progress), |storage| usual(Some(storage))),
     }
+}
+
+/// Like [`toward`], of what the settings or a search give; `whole`: what is too large for a [`Goal::Ram`], where there is such a bundle.
+fn once(tracer: &Tracer<'_>, options: &Options, whole: Option<Whole>, progress: Progress<'_>) -> Result<Baked, BakeError> {
+    let (start, scene) = (Instant::now(), tracer.scene());
     // What outlines need of it, flash has. Where memory or quality is searched for no finer ones are tried.
     let outline = whole.map_or(options.source.outline, |whole| whole.settings.atlas.outline);
     let outline = if matches!(options.goal, Goal::AsSet | Goal::Budget(_)) { outline } else { outline.or(Some(0)) };
     let options = &Options { source: atlas::Settings { outline, ..options.source }, ..*options };
-    let choice_seconds = start.elapsed().as_secs_f64();
-    let settings = options.settings(scene.playback.width);
     let cast = Cast::by(tracer.of(scene), progress);
     let paint_start = Instant::now();
     let painter = (!options.plain).then(|| Painter::new(&cast, progress));
     let paint_seconds = paint_start.elapsed().as_secs_f64();
-    let space = |cell: u32, bends: Option<Bends>| options.space.unwrap_or(straight::first(cell, bends));
-    let (chosen, fitted, bends) = match options.goal {
-        Goal::AsSet => {
-            let flat = bake::flatten_cast(&cast, &settings.atlas, progress)?;
-            something_seen(&flat)?;
-            let bends = if options.space.is_none() { straight::told(&flat.atlas.gbuffer, settings.cell) } else { None };
-            let settings = Settings { space: space(settings.cell, bends), ..settings };
-            let fitted = bake::fitted(scene, &flat, &settings, progress)?;
-            let encoded = bake::settled(scene, &flat, &fitted, &settings, progress)?;
-            (Chosen { flat, encoded, settings, search_seconds: 0.0, warnings: Vec::new() }, Some(fitted), bends)
-        }
-        goal => (tune::search((&cast, painter.as_ref()), options, goal, whole, progress)?, None, None),
+    let (chosen, surface) = match options.goal {
+        Goal::AsSet => as_set(&cast, options, progress)?,
+        goal => (tune::search((&cast, painter.as_ref()), options, goal, whole, progress)?, Surface::default()),
     };
-    let Chosen { mut flat, encoded, settings, search_seconds, warnings } = chosen;
+    let Chosen { mut flat, encoded, settings, search_seconds, warnings, contested } = chosen;
     // Large, and of no more use.
     drop(cast);
-    let finer_start = Instant::now();
+    let better_start = Instant::now();
     let quality = verify::briefly(&encoded.bundle, &flat.atlas.image, &flat.atlas.gbuffer)?;
-    let free = options.goal == Goal::AsSet && options.cell.is_none() && options.key_interval.is_none();
+    let (seen, bends) = (Seen::new(tracer, painter.as_ref()), surface.bends);
     let made = Made { settings, encoded, quality };
-    let budget = if let Goal::Budget(budget) = options.goal { Some(budget) } else { None };
-    let (made, outlines) = outlines::choose(scene, &mut flat, fitted, made, budget, progress)?;
-    let all = made.quality;
-    // Searches have left out what they could.
-    let prunes = !options.all_sheets && options.goal == Goal::AsSet;
-    let made = if prunes { fewer::choose(scene, &flat, made, progress)? } else { made };
-    let seen = Seen::new(tracer, painter.as_ref());
-    let (made, other) =
-        if free { finer::choose(scene, &flat, made, &all, &|cell| space(cell, bends), &seen, progress)? } else { (made, None) };
-    // In smaller cells they bend less.
-    let smooth = bends == Some(Bends::Smooth) && made.settings.cell >= settings.cell;
-    let tries = options.goal == Goal::AsSet && options.space.is_none() && !smooth;
-    let (made, spaces) = if tries { straight::choose(scene, &flat, made, progress)? } else { (made, Vec::new()) };
-    // In other cells what a sheet has to save is another thing.
-    let mut made = if prunes && other.is_some() { fewer::anew(scene, &flat, made, progress)? } else { made };
-    let finer = other.map(|other| other.said(&made));
+    let Bettered { mut made, outlines, spaces, why } = bettered((scene, &mut flat), made, surface, options, &seen, progress)?;
     let psnr_before = made.quality.psnr_mean;
-    let (search_seconds, paint_start) = (search_seconds + finer_start.elapsed().as_secs_f64(), Instant::now());
+    let (search_seconds, paint_start) = (search_seconds + better_start.elapsed().as_secs_f64(), Instant::now());
     let repainted = painter.as_ref().map_or(Ok(false), |painter| painter.repaint(&mut made, &mut flat.atlas, options.goal))?;
     let (paint_seconds, verify_start) = (paint_seconds + paint_start.elapsed().as_secs_f64(), Instant::now());
     let Made { settings, encoded, .. } = made;
-    let part = |done: u32, total: u32| f64::from(done) / f64::from(total.max(1));
     progress("comparing with exact rays", 0.0);
     let quality = verify::against_exact(&encoded.bundle, &flat.atlas, &|d, n| progress("comparing with exact rays", part(d, n)))?;
     let inspection = Inspection::of(&encoded.bundle).map_err(verify::VerifyError::from)?;
     let work = verify::work(&encoded.bundle)?;
-    let frames = match options.truth {
-        TruthFrames::None => Vec::new(),
-        TruthFrames::Most(most) => spread(scene.playback.frames, most),
-        TruthFrames::All => spread(scene.playback.frames, scene.playback.frames),
-    };
-    let truth = if frames.is_empty() {
-        None
-    } else {
-        progress("comparing with the truth", 0.0);
-        let bar = |d, n| progress("comparing with the truth", part(d, n));
-        Some(verify::against_truth(&encoded.bundle, &Truth::by(tracer.of(scene)), &frames, seen.rendered(), &bar)?)
-    };
+    let truth = against_truth(&encoded.bundle, (tracer, &seen), options.truth, progress)?;
     let seconds = Seconds {
         total: options.load_seconds + tracer.seconds + start.elapsed().as_secs_f64(),
         load: options.load_seconds,
@@ -307,15 +156,107 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
         encode: encoded.seconds,
         paint: paint_seconds,
         verify: verify_start.elapsed().as_secs_f64(),
-        search: choice_seconds + search_seconds,
+        search: search_seconds,
     };
     let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings, spaces, bends, outlines, repainted };
     let mut report = Report::new(&origin, &inspection, quality, truth, work, seconds);
     // By what it takes with the outline that was chosen for it.
-    let packed = budget.filter(|_| settings.atlas.storage != options.source().storage);
+    let packed = options.budget().filter(|_| settings.atlas.storage != options.source().storage);
     let packed = packed.map(|budget| tune::packed(budget, report.memory.picture));
-    report.warnings.extend(warnings.into_iter().chain(packed).chain(finer));
-    Ok(Baked { bundle: encoded.bundle, report, flat, settings, psnr_before })
+    report.warnings.extend(warnings.into_iter().chain(packed).chain(why));
+    Ok(Baked { bundle: encoded.bundle, report, flat, settings, psnr_before, contested })
+}
+
+/// What is known of the surface that a bundle was made of, where the settings alone made it.
+#[derive(Default)]
+struct Surface {
+    fitted: Option<Fitted>,
+    bends: Option<Bends>,
+}
+
+/// How positions are interpolated between nodes at first, in cells of `cell` pixels.
+fn first_space(options: &Options, bends: Option<Bends>, cell: u32) -> u8 {
+    options.space.unwrap_or(straight::first(cell, bends))
+}
+
+/// What the settings make of the scene.
+fn as_set(cast: &Cast<'_>, options: &Options, progress: Progress<'_>) -> Result<(Chosen, Surface), BakeError> {
+    let scene = cast.scene;
+    let settings = options.settings(scene.playback.width);
+    let flat = bake::flatten_cast(cast, &settings.atlas, progress)?;
+    something_seen(&flat)?;
+    let bends = if options.space.is_none() { straight::told(&flat.atlas.gbuffer, settings.cell) } else { None };
+    let settings = Settings { space: first_space(options, bends, settings.cell), ..settings };
+    let fitted = bake::fitted(scene, &flat, &settings, progress)?;
+    let encoded = bake::settled(scene, &flat, &fitted, &settings, progress)?;
+    let chosen = Chosen { flat, encoded, settings, search_seconds: 0.0, warnings: Vec::new(), contested: None };
+    Ok((chosen, Surface { fitted: Some(fitted), bends }))
+}
+
+/// A bundle bettered, and what the report has to say of it.
+struct Bettered {
+    made: Made,
+    outlines: Vec<outlines::Trial>,
+    spaces: Vec<straight::Trial>,
+    /// Why it has other cells or intervals than usual.
+    why: Option<String>,
+}
+
+/// `made`, or what is made of the same source image otherwise and is worth more: of what the user left open, the outline, the sheets, the grid and the
+/// space are tried, one after the other. Searches have tried what they could; of theirs it is the outline alone.
+fn bettered(
+    (scene, flat): (&Scene, &mut Flat),
+    made: Made,
+    Surface { fitted, bends }: Surface,
+    options: &Options,
+    seen: &Seen<'_>,
+    progress: Progress<'_>,
+) -> Result<Bettered, BakeError> {
+    let usual = made.settings;
+    let (made, outlines) = outlines::choose(scene, flat, fitted, made, options.budget(), progress)?;
+    if options.goal != Goal::AsSet {
+        return Ok(Bettered { made, outlines, spaces: Vec::new(), why: None });
+    }
+    let all = made.quality;
+    let made = if options.all_sheets { made } else { fewer::choose(scene, flat, made, progress)? };
+    let (made, other) = if options.cell.is_none() && options.key_interval.is_none() {
+        finer::choose(scene, flat, made, &all, &|cell| first_space(options, bends, cell), seen, progress)?
+    } else {
+        (made, None)
+    };
+    // In smaller cells they bend less.
+    let smooth = bends == Some(Bends::Smooth) && made.settings.cell >= usual.cell;
+    let (made, spaces) =
+        if options.space.is_none() && !smooth { straight::choose(scene, flat, made, progress)? } else { (made, Vec::new()) };
+    // In other cells what a sheet has to save is another thing.
+    let made = if !options.all_sheets && other.is_some() { fewer::anew(scene, flat, made, progress)? } else { made };
+    let why = other.map(|other| other.said(&made));
+    Ok(Bettered { made, outlines, spaces, why })
+}
+
+/// The finished `bundle` beside as much of the antialiased scene as is asked for.
+fn against_truth(
+    bundle: &[u8],
+    (tracer, seen): (&Tracer<'_>, &Seen<'_>),
+    asked: TruthFrames,
+    progress: Progress<'_>,
+) -> Result<Option<verify::TruthQuality>, BakeError> {
+    let scene = tracer.scene();
+    let frames = match asked {
+        TruthFrames::None => return Ok(None),
+        TruthFrames::Most(most) => spread(scene.playback.frames, most),
+        TruthFrames::All => spread(scene.playback.frames, scene.playback.frames),
+    };
+    if frames.is_empty() {
+        return Ok(None);
+    }
+    progress("comparing with the truth", 0.0);
+    let bar = |d, n| progress("comparing with the truth", part(d, n));
+    Ok(Some(verify::against_truth(bundle, &Truth::by(tracer.of(scene)), &frames, seen.rendered(), &bar)?))
+}
+
+fn part(done: u32, total: u32) -> f64 {
+    f64::from(done) / f64::from(total.max(1))
 }
 
 /// How to cut the surface: as asked for, as the scene brings it, or as trials show.

@@ -104,7 +104,7 @@ impl Search<'_> {
             });
         };
         let warnings = vec![gave_up(room, &asked, whole, &tried, psnr)];
-        Ok(Chosen { flat, encoded: tried.encoded, settings: tried.settings, search_seconds: 0.0, warnings })
+        Ok(Chosen { flat, encoded: tried.encoded, settings: tried.settings, search_seconds: 0.0, warnings, contested: None })
     }
 
     /// Tries what takes less memory than `tried` on the same grid: straight time, straight space, or both.
@@ -211,7 +211,8 @@ fn gave_up(room: usize, asked: &Settings, whole: Option<Whole>, tried: &Tried, p
 mod tests {
     use super::*;
     use crate::atlas::Storage;
-    use crate::job::{Goal, Options, TruthFrames, bake_scene};
+    use crate::job::bake_scene;
+    use crate::options::{Goal, Options, TruthFrames};
     use crate::report::Report;
     use crate::scene::{Scene, builtin};
     use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC};
@@ -263,13 +264,14 @@ mod tests {
         // What would do for a raw one does not: something else has to go, for the picture was asked for.
         let (_, _, report) = bake(Some(packed - 1), Options { storage, ..Options::default() }).unwrap();
         assert!(report.source_image.storage == Storage::Packed && report.warnings.iter().any(|warning| warning.contains("--ram")));
-        let error = bake(Some(1_000), Options { storage, ..Options::default() }).err().unwrap().to_string();
+        let error = bake(Some(1_000), Options { storage, cell: Some(8), ..Options::default() }).err().unwrap().to_string();
         assert!(error.ends_with("or leave --storage to the search"), "{error}");
     }
 
     #[test]
     fn straight_time_saves_two_keys() {
-        let asked = Options { space: Some(SPACE_CUBIC), ..Options::default() };
+        // Keys as far apart as usual, whatever the cells.
+        let asked = Options { space: Some(SPACE_CUBIC), key_interval: Some(8), ..Options::default() };
         let (_, curved, _) = bake(None, asked).unwrap();
         let straight = memory_as(&curved, TIME_LINEAR, SPACE_CUBIC).unwrap();
         let (memory, bytes, report) = bake(Some(straight + 64), asked).unwrap();

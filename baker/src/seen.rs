@@ -1,5 +1,6 @@
 //! Bundles as they are seen: beside the antialiased scene, in the colours that they end up in. What outlines and texels lose there, no keys bring back, which
-//! exact rays do not tell. The scene and a painter come from `job`; `finer` asks what keys closer together or farther apart are worth.
+//! exact rays do not tell. The scene and a painter come from `job`; `finer` asks what keys closer together or farther apart are worth, `usual`
+//! which of two is the better.
 
 use crate::bake::{BakeError, Flat};
 use crate::made::Made;
@@ -39,8 +40,16 @@ impl<'a> Seen<'a> {
             Some(painter) => painter.painted(bundle, &flat.atlas.image, &made.settings.atlas)?,
             None => None,
         };
-        let psnr = verify::against_pictures(painted.as_ref().map_or(bundle, |(painted, _)| painted), self.pictures())?;
+        let psnr = self.psnr(painted.as_ref().map_or(bundle, |(painted, _)| painted))?;
         Ok(metrics::worth(psnr, bundle.len().saturating_sub(picture) as u64, DOUBLE))
+    }
+
+    /// Mean PSNR of a finished bundle's frames, dB.
+    ///
+    /// # Errors
+    /// Those of the player.
+    pub fn psnr(&self, bundle: &[u8]) -> Result<f64, BakeError> {
+        Ok(verify::against_pictures(bundle, self.pictures())?)
     }
 
     /// What was rendered of the scene: which frames, and R, G, B, row by row.

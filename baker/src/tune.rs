@@ -7,8 +7,9 @@ use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings, Sparing};
 use crate::cast::Cast;
 use crate::climb::{Free, Step, Take, climb};
 use crate::encode::image_bytes;
-use crate::job::{self, Chosen, Goal, Options, Whole};
+use crate::job::{self, Chosen, Whole};
 use crate::metrics;
+use crate::options::{Goal, Options};
 use crate::repaint::Painter;
 use crate::report::grouped;
 use crate::samples::Samples;
@@ -36,7 +37,7 @@ const STEPS: usize = 18;
 /// The score of a bundle of no bytes that reaches the quality asked for; no quality in dB is half as high, nor is a bundle half as large.
 const REACHED: f64 = 1e12;
 /// Bytes of working memory that a player may need without having been told: half of an RP2040's. More only where the first tries take it too.
-const MOST_MEMORY: usize = 128 << 10;
+pub(crate) const MOST_MEMORY: usize = 128 << 10;
 /// How far a predicted size may lie over the budget and still be tried: coarser keys take less.
 const SLACK: f64 = 1.15;
 
@@ -138,7 +139,7 @@ impl Search<'_> {
 
     fn finish(&self, flat: Flat, settings: Settings, warnings: Vec<String>) -> Result<Chosen, BakeError> {
         let encoded = self.encode(&flat, &settings)?;
-        Ok(Chosen { flat, encoded, settings, search_seconds: 0.0, warnings })
+        Ok(Chosen { flat, encoded, settings, search_seconds: 0.0, warnings, contested: Some(settings.atlas.storage) })
     }
 
     /// The grids to try, the coarsest first.
@@ -173,7 +174,7 @@ impl Search<'_> {
         let mut reference: Option<Flat> = None;
         let asked = self.options.source();
         let all = self.options.detail.is_none().then_some((f64::INFINITY, 1.0));
-        let mut scale = 1.0;
+        let (mut scale, mut usual) = (1.0, None);
         for (step, (detail, ratio)) in all.into_iter().chain(DENSITIES.map(|ratio| (asked.detail, ratio))).enumerate() {
             self.say(step, steps);
             let source = atlas::Settings { density: asked.density * scale * ratio, detail, ..asked };
@@ -186,12 +187,13 @@ impl Search<'_> {
                 continue;
             }
             let flat = self.flat(source)?;
+            let packed = self.options.storage.is_none().then(|| image_bytes(&flat.atlas.image, Storage::Packed));
+            let bytes = image_bytes(&flat.atlas.image, source.storage);
             if detail == asked.detail && ratio == 1.0 {
                 // Where the image is full, densities above what it holds change nothing.
                 scale = flat.atlas.figures.scale.min(1.0);
+                usual = Some((bytes, packed));
             }
-            let packed = self.options.storage.is_none().then(|| image_bytes(&flat.atlas.image, Storage::Packed));
-            let bytes = image_bytes(&flat.atlas.image, source.storage);
             let image = Image { source, bytes, packed, error: samples.of_image(&flat.atlas) };
             if reference.is_none() && (image.least() < room / 10 * 9 || coarsest) {
                 reference = Some(flat);
@@ -209,7 +211,17 @@ impl Search<'_> {
             let error = |(image, keys): &(&Image, &Keys)| image.error + keys.error;
             error(a).total_cmp(&error(b)).then(a.0.with(a.1, budget).0.cmp(&b.0.with(b.1, budget).0))
         });
-        self.best_pair(budget, &pairs, &samples, steps)
+        let chosen = self.best_pair(budget, &pairs, &samples, steps)?;
+        // Half of what its keys take here may go as they are settled.
+        let base = self.options.settings(self.scene.playback.width);
+        let own = keys.iter().find(|keys| (keys.settings.cell, keys.settings.key_interval) == (base.cell, base.key_interval));
+        let fits = |image: usize| (image + own.map_or(0, |own| own.bytes / 2)) as u64 <= budget;
+        let contested = match usual {
+            Some((bytes, _)) if fits(bytes) => Some(asked.storage),
+            Some((_, Some(packed))) if fits(packed) => Some(Storage::Packed),
+            _ => None,
+        };
+        Ok(Chosen { contested, ..chosen })
     }
 
     /// Measures every way to code keys at one source image.
@@ -392,7 +404,8 @@ pub(crate) fn possible<T>(attempt: Result<T, BakeError>, exceeded: &mut Option<B
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::job::{TruthFrames, bake_scene};
+    use crate::job::bake_scene;
+    use crate::options::TruthFrames;
     use crate::scene::builtin;
 
     fn small(name: &str) -> Scene {
@@ -422,10 +435,10 @@ mod tests {
     fn a_picture_is_packed_where_it_does_not_fit_raw() {
         let scene = small("street");
         let bake = |goal, storage| {
-            let options = Options { goal, storage, truth: TruthFrames::All, ..Options::default() };
+            let options = Options { goal, storage, cell: Some(8), truth: TruthFrames::All, ..Options::default() };
             bake_scene(&scene, &options, &|_, _| {}).unwrap()
         };
-        let (plain, _) = bake(Goal::AsSet, None);
+        let (plain, usual) = bake(Goal::AsSet, None);
         let tight = Goal::Budget(plain.len() as u64 * 45 / 100);
         let told = |report: &crate::Report| report.warnings.iter().any(|warning| warning.contains("--storage raw"));
         let (bytes, open) = bake(tight, None);
@@ -441,9 +454,10 @@ mod tests {
         assert!(raw.source_image.storage == Storage::Raw && raw.memory.picture == 0 && !told(&raw));
         let psnr = |report: &crate::Report| report.quality_vs_truth.unwrap().psnr_mean;
         assert!(psnr(&open) > psnr(&raw), "{} {}", psnr(&open), psnr(&raw));
-        // Where there is room, flash is where the picture stays.
+        // Where there is room, flash is where the picture stays, and nothing is worse than it were without a budget.
         let (_, wide) = bake(Goal::Budget(plain.len() as u64 * 4), None);
         assert!(wide.source_image.storage == Storage::Raw && !told(&wide));
+        assert!(psnr(&wide) >= psnr(&usual), "{} {}", psnr(&wide), psnr(&usual));
     }
 
     #[test]
@@ -454,11 +468,10 @@ mod tests {
             bake_scene(&scene, &options, &|_, _| {})
         };
         let (plain, report) = bake_scene(&scene, &Options::default(), &|_, _| {}).unwrap();
-        let (reached, keys) = (report.quality.psnr_mean, report.bytes.keys);
+        let reached = report.quality.psnr_mean;
         let (bytes, report) = bake(reached - 1.0).unwrap();
-        // Either leaves out sheets at its own quality, which is a matter of some bytes of keys.
         assert!(
-            report.quality.psnr_mean >= reached - 1.0 && bytes.len() <= plain.len() + keys / 10,
+            report.quality.psnr_mean >= reached - 1.0 && bytes.len() <= plain.len(),
             "{reached} {} dB, {} {} bytes, {:?}",
             report.quality.psnr_mean,
             plain.len(),

@@ -2,9 +2,9 @@
 //! A scene comes in from `input`; bundle bytes, rows for the table and warnings go back.
 
 use anyhow::{Context, Result};
-use cubist_baker::job::{self, Options, TruthFrames};
 use cubist_baker::report;
 use cubist_baker::scene::{self, Overrides};
+use cubist_baker::{Options, TruthFrames, job};
 use cubist_core::format::SPACE_CUBIC;
 use std::path::Path;
 

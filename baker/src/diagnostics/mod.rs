@@ -121,8 +121,8 @@ fn side_by_side(width: u32, pictures: [&[u8]; 3]) -> Vec<u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use cubist_baker::job::{self, Options, TruthFrames};
     use cubist_baker::scene::builtin;
+    use cubist_baker::{Options, TruthFrames, job};
 
     #[test]
     fn pictures_have_their_sizes_and_show_what_was_never_seen() {

@@ -3,7 +3,8 @@
 
 use super::{Table, baked, markdown, number};
 use anyhow::{Context, Result, bail};
-use cubist_baker::job::{Baked, Options};
+use cubist_baker::Options;
+use cubist_baker::job::Baked;
 use cubist_baker::scene::Scene;
 use cubist_baker::{Report, TruthFrames};
 use cubist_core::Bundle;

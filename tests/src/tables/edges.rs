@@ -4,8 +4,9 @@
 use super::{Table, baked, markdown, number};
 use crate::play;
 use anyhow::Result;
+use cubist_baker::Options;
 use cubist_baker::TruthFrames;
-use cubist_baker::job::{Baked, Options};
+use cubist_baker::job::Baked;
 use cubist_baker::metrics;
 use cubist_baker::scene::Scene;
 use cubist_baker::truth::{Truth, spread};

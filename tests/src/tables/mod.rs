@@ -10,7 +10,8 @@ pub mod edges;
 pub mod hard;
 
 use anyhow::{Context, Result};
-use cubist_baker::job::{self, Baked, Options};
+use cubist_baker::Options;
+use cubist_baker::job::{self, Baked};
 use cubist_baker::scene::{Overrides, Scene, load, load_builtin};
 use serde_json::Value;
 use std::path::Path;

@@ -1,0 +1,144 @@
+//! What a user asks of a bundle, and which settings follow from it. The command line fills it in, `job` carries it out.
+
+use crate::atlas::{self, Storage};
+use crate::bake::{Settings, Sparing};
+use crate::chart::Choice;
+
+/// Screens wider than this get cells of 16 pixels unless told otherwise.
+const WIDE: u32 = 640;
+/// What the bundle is to reach.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Goal {
+    /// What the settings give.
+    #[default]
+    AsSet,
+    /// At most this many bytes, at the best quality that fits.
+    Budget(u64),
+    /// The fewest bytes with at least this mean PSNR, dB, against exact ray casting.
+    Psnr(f64),
+    /// At most this many bytes of working memory for playing, at the best quality that fits.
+    Ram(usize),
+}
+
+/// The frames to compare with the antialiased scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TruthFrames {
+    /// None.
+    None,
+    /// At most this many, evenly spread.
+    Most(u32),
+    /// All.
+    All,
+}
+
+/// What the user asks of a bundle.
+#[derive(Clone, Copy, Debug)]
+pub struct Options {
+    /// Side of a cell, pixels; `None`: the baker chooses.
+    pub cell: Option<u32>,
+    /// Frames between keys; `None`: the baker chooses.
+    pub key_interval: Option<u32>,
+    /// How layers are interpolated between keys: one of the format's `TIME_` numbers; `None`: the baker chooses.
+    pub time: Option<u8>,
+    /// How they are interpolated between nodes: one of the format's `SPACE_` numbers; `None`: the baker chooses.
+    pub space: Option<u8>,
+    /// Keys stand at even intervals, not where they are needed most.
+    pub even_keys: bool,
+    /// The source image; a search may make it coarser.
+    pub source: atlas::Settings,
+    /// What its detail is worth, in place of `source.detail`; `None`: as that says, but a search for a budget may keep all of it.
+    pub detail: Option<f64>,
+    /// How the bundle holds it, in place of `source.storage`; `None`: as that says, but a search for a budget may pack it.
+    pub storage: Option<Storage>,
+    /// How the surface is cut and flattened, in place of `source.charts`; `None`: the baker tries.
+    pub charts: Option<Choice>,
+    /// Whether texels move inside charts to where their detail is seen; `None`: the baker tries, where it tries charts.
+    pub rewarp: Option<bool>,
+    /// What a bit of the keys is worth, as [`Settings::coding`] has it; `None`: as much as hardly shows.
+    pub lambda: Option<f32>,
+    /// Every this many keys one that needs no earlier one.
+    pub independent_every: usize,
+    /// Keeps sheets that take more than what they show is worth.
+    pub all_sheets: bool,
+    /// Texels keep the colours of what lies there, whatever playback makes of them.
+    pub plain: bool,
+    /// What to reach.
+    pub goal: Goal,
+    /// How much is compared with the truth.
+    pub truth: TruthFrames,
+    /// Seconds that reading the scene took, for the report.
+    pub load_seconds: f64,
+}
+
+impl Default for Options {
+    fn default() -> Self {
+        Self {
+            cell: None,
+            key_interval: None,
+            time: None,
+            space: None,
+            even_keys: false,
+            source: atlas::Settings::default(),
+            detail: None,
+            storage: None,
+            charts: None,
+            rewarp: None,
+            lambda: None,
+            independent_every: Settings::default().coding.independent_every,
+            all_sheets: false,
+            plain: false,
+            goal: Goal::AsSet,
+            truth: TruthFrames::Most(16),
+            load_seconds: 0.0,
+        }
+    }
+}
+
+impl Options {
+    /// The settings for a screen `width` pixels wide, the baker's choices filled in.
+    #[must_use]
+    pub fn settings(&self, width: u32) -> Settings {
+        let mut settings = Settings { atlas: self.source(), ..Settings::default() };
+        settings.coding.independent_every = self.independent_every;
+        settings.coding.lambda = self.lambda.unwrap_or(settings.coding.lambda);
+        // The other searches look for what a bit is worth themselves.
+        let spares = self.lambda.is_none() && matches!(self.goal, Goal::AsSet | Goal::Ram(_));
+        settings.sparing = if spares { Sparing::Unseen } else { Sparing::Nothing };
+        settings.cell = self.cell.unwrap_or(if width > WIDE { 16 } else { settings.cell });
+        settings.key_interval = self.key_interval.unwrap_or(settings.key_interval);
+        settings.time = self.time.unwrap_or(settings.time);
+        settings.space = self.space.unwrap_or(settings.space);
+        settings.adapt_keys = !self.even_keys;
+        settings
+    }
+
+    /// The source image, stored as asked for.
+    #[must_use]
+    pub fn source(&self) -> atlas::Settings {
+        atlas::Settings {
+            detail: self.detail.unwrap_or(self.source.detail),
+            storage: self.storage.unwrap_or(self.source.storage),
+            charts: self.charts.unwrap_or(self.source.charts),
+            ..self.source
+        }
+    }
+
+    /// The budget of bytes that is to be kept, if that is the goal.
+    pub(crate) fn budget(&self) -> Option<u64> {
+        if let Goal::Budget(budget) = self.goal { Some(budget) } else { None }
+    }
+
+    /// What else helps where a search finds nothing: to leave to it what is given; nothing where nothing is. `cells`: the search would try other
+    /// cells than the one that is given.
+    pub(crate) fn held(&self, cells: bool) -> String {
+        let all = [
+            (cells && self.cell.is_some(), "--cell"),
+            (self.key_interval.is_some(), "--key-interval"),
+            (!cells && self.time.is_some(), "--time"),
+            (!cells && self.space.is_some(), "--space"),
+            (!cells && self.storage == Some(Storage::Packed), "--storage"),
+        ];
+        let given: Vec<&str> = all.into_iter().filter_map(|(given, name)| given.then_some(name)).collect();
+        if given.is_empty() { String::new() } else { format!(", or leave {} to the search", given.join(" and ")) }
+    }
+}

@@ -1,0 +1,59 @@
+//! What is baked where nothing is asked for, beside what a search found: a search tries more ways to reach its goal, the usual way makes more of the one
+//! that it takes. `job` hands in both; the one that reaches the goal better goes back.
+
+use crate::atlas::Storage;
+use crate::bake::BakeError;
+use crate::job::Baked;
+use crate::options::{Goal, Options};
+use crate::seen::Seen;
+use crate::tune::{self, MOST_MEMORY};
+
+/// What a search for the goal of `options` `found`, or the `usual` bundle, stored as it has to be, where that reaches the goal better: within a budget of
+/// bytes with more quality beside what is `seen`, or a quality with fewer bytes. In memory that searches would not take either it is no answer.
+///
+/// # Errors
+/// What the search came to, where the usual bundle does not reach the goal either; those of the player.
+pub(crate) fn or_found(
+    options: &Options,
+    seen: &Seen<'_>,
+    found: Result<Baked, BakeError>,
+    usual: impl FnOnce(Storage) -> Result<Baked, BakeError>,
+) -> Result<Baked, BakeError> {
+    let (goal, asked) = (options.goal, options.source().storage);
+    let found = match found {
+        // Whatever else is wrong is wrong with both.
+        Err(error @ BakeError::Psnr { .. }) => return usual(asked).ok().filter(|usual| reaches(goal, usual)).ok_or(error),
+        found => found?,
+    };
+    let Some(storage) = found.contested else { return Ok(found) };
+    let Ok(usual) = usual(storage) else { return Ok(found) };
+    let (total, memory) = (found.report.seconds.total + usual.report.seconds.total, found.report.memory.workspace.max(MOST_MEMORY));
+    let wins = reaches(goal, &usual) && usual.report.memory.workspace <= memory && better(goal, seen, &usual, &found)?;
+    let mut best = if wins { usual } else { found };
+    if let Goal::Budget(budget) = goal
+        && wins
+        && storage != asked
+    {
+        best.report.warnings.push(tune::packed(budget, best.report.memory.picture));
+    }
+    let seconds = &mut best.report.seconds;
+    (seconds.search, seconds.total) = (seconds.search + total - seconds.total, total);
+    Ok(best)
+}
+
+fn reaches(goal: Goal, usual: &Baked) -> bool {
+    match goal {
+        Goal::AsSet => true,
+        Goal::Budget(most) => usual.bundle.len() as u64 <= most,
+        Goal::Psnr(least) => usual.report.quality.psnr_mean >= least,
+        Goal::Ram(room) => usual.report.memory.workspace <= room,
+    }
+}
+
+/// Whether `usual` is a better answer than `found`; both reach the goal.
+fn better(goal: Goal, seen: &Seen<'_>, usual: &Baked, found: &Baked) -> Result<bool, BakeError> {
+    match goal {
+        Goal::Psnr(_) => Ok(usual.bundle.len() < found.bundle.len()),
+        _ => Ok(seen.psnr(&usual.bundle)? > seen.psnr(&found.bundle)?),
+    }
+}
