@@ -98,7 +98,7 @@ pub struct Bake {
     /// Cubic bends every cell evenly across and down, by as much as the corners around it say: large flat surfaces seen at a slant want that. Linear
     /// takes less memory, and draws in a twentieth to a sixth fewer instructions; on most models of many small faces nothing
     /// shows the difference. Without this both are made in cells of 4 and 8 pixels, and the report has the figures of both, unless surfaces are so
-    /// rough, or bend so smoothly, that one is sure. Searches (--budget, --psnr) take cubic; --ram tries what fits.
+    /// rough, or bend so smoothly, that one is sure. Searches (--budget, --psnr) try cubic, beside what is baked without them; --ram tries what fits.
     #[arg(long, value_enum, value_name = "KIND")]
     pub space: Option<Space>,
     /// Largest side of the source image, texels, 64 to 1024.
@@ -171,7 +171,7 @@ pub struct Bake {
     /// Bars, railings and leaves about as thin as a texel want finer outlines than texels. They take as much flash as a quarter (2) to as much as all of
     /// the texels (4) where most of a picture is such, next to nothing where charts are large; nothing else changes. Lattices gain 1 to 3 dB, bodies of
     /// few outlines nothing. Auto tries them where many outlines cross the picture, and takes what is worth its bytes: twice the bundle has to bring 1.55 dB.
-    /// --budget takes them where there is room; --psnr takes 1.
+    /// --budget takes them where there is room; the search for --psnr tries 1.
     #[arg(long, value_enum, value_name = "BITS", default_value_t = Outlines::Auto)]
     pub outline: Outlines,
     /// Every Nth key needs no earlier one: a seek decodes at most N + 3 keys, N + 1 where time is straight or held.
@@ -179,13 +179,14 @@ pub struct Bake {
     pub independent_every: u16,
     /// The whole bundle takes at most this many bytes (also 256K, 2M), at the best quality that does.
     ///
-    /// Quality is measured against the antialiased scene; cells, keys and the source image are searched.
+    /// Quality is measured against the antialiased scene; cells, keys and the source image are searched. What is baked without a budget is taken
+    /// where it fits and shows more.
     #[arg(long, value_name = "BYTES", value_parser = budget, allow_negative_numbers = true, conflicts_with_all = ["psnr", "ram"])]
     pub budget: Option<u64>,
     /// The smallest bundle whose mean PSNR against exact rays through its source image reaches this many dB.
     ///
     /// Cells and keys are searched; the source image stays as --atlas and --density ask, and gets coarser only where nothing
-    /// else reaches the goal.
+    /// else reaches the goal. What is baked without a goal is taken where it reaches this one in fewer bytes.
     #[arg(long, value_name = "DB", value_parser = psnr, allow_negative_numbers = true, conflicts_with = "ram")]
     pub psnr: Option<f64>,
     /// Playing takes at most this many bytes of working memory (also 48K), at the best quality that does.
