@@ -90,11 +90,12 @@ pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<B
 fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<Baked, BakeError> {
     let start = Instant::now();
     let choice = choice(tracer, options, progress)?;
-    let choice_seconds = start.elapsed().as_secs_f64();
     let options = &Options { charts: Some(choice), ..*options };
     let mut baked = toward(tracer, options, progress)?;
-    baked.report.seconds.search += choice_seconds;
-    baked.report.seconds.total += choice_seconds;
+    // Whatever was not for this bundle was for finding it.
+    let (seconds, total) = (&mut baked.report.seconds, options.load_seconds + tracer.seconds + start.elapsed().as_secs_f64());
+    seconds.search += total - seconds.total;
+    seconds.total = total;
     Ok(baked)
 }
 

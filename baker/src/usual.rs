@@ -27,7 +27,7 @@ pub(crate) fn or_found(
     };
     let Some(storage) = found.contested else { return Ok(found) };
     let Ok(usual) = usual(storage) else { return Ok(found) };
-    let (total, memory) = (found.report.seconds.total + usual.report.seconds.total, found.report.memory.workspace.max(MOST_MEMORY));
+    let memory = found.report.memory.workspace.max(MOST_MEMORY);
     let wins = reaches(goal, &usual) && usual.report.memory.workspace <= memory && better(goal, seen, &usual, &found)?;
     let mut best = if wins { usual } else { found };
     if let Goal::Budget(budget) = goal
@@ -36,8 +36,6 @@ pub(crate) fn or_found(
     {
         best.report.warnings.push(tune::packed(budget, best.report.memory.picture));
     }
-    let seconds = &mut best.report.seconds;
-    (seconds.search, seconds.total) = (seconds.search + total - seconds.total, total);
     Ok(best)
 }
 
