@@ -92,6 +92,12 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
     let choice = choice(tracer, options, progress)?;
     let options = &Options { charts: Some(choice), ..*options };
     let mut baked = toward(tracer, options, progress)?;
+    if let Some(budget) = options.budget()
+        && baked.settings.atlas.storage != options.source().storage
+    {
+        // By what it takes with the outline that was chosen for it.
+        baked.report.warnings.push(tune::packed(budget, baked.report.memory.picture));
+    }
     // Whatever was not for this bundle was for finding it.
     let (seconds, total) = (&mut baked.report.seconds, options.load_seconds + tracer.seconds + start.elapsed().as_secs_f64());
     seconds.search += total - seconds.total;
@@ -161,10 +167,7 @@ fn once(tracer: &Tracer<'_>, options: &Options, whole: Option<Whole>, progress: 
     };
     let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings, spaces, bends, outlines, repainted };
     let mut report = Report::new(&origin, &inspection, quality, truth, work, seconds);
-    // By what it takes with the outline that was chosen for it.
-    let packed = options.budget().filter(|_| settings.atlas.storage != options.source().storage);
-    let packed = packed.map(|budget| tune::packed(budget, report.memory.picture));
-    report.warnings.extend(warnings.into_iter().chain(packed).chain(why));
+    report.warnings.extend(warnings.into_iter().chain(why));
     Ok(Baked { bundle: encoded.bundle, report, flat, settings, psnr_before, contested })
 }
 

@@ -6,7 +6,7 @@ use crate::bake::BakeError;
 use crate::job::Baked;
 use crate::options::{Goal, Options};
 use crate::seen::Seen;
-use crate::tune::{self, MOST_MEMORY};
+use crate::tune::MOST_MEMORY;
 
 /// What a search for the goal of `options` `found`, or the `usual` bundle, stored as it has to be, where that reaches the goal better: within a budget of
 /// bytes with more quality beside what is `seen`, or a quality with fewer bytes. In memory that searches would not take either it is no answer.
@@ -19,24 +19,19 @@ pub(crate) fn or_found(
     found: Result<Baked, BakeError>,
     usual: impl FnOnce(Storage) -> Result<Baked, BakeError>,
 ) -> Result<Baked, BakeError> {
-    let (goal, asked) = (options.goal, options.source().storage);
+    let goal = options.goal;
     let found = match found {
         // Whatever else is wrong is wrong with both.
-        Err(error @ BakeError::Psnr { .. }) => return usual(asked).ok().filter(|usual| reaches(goal, usual)).ok_or(error),
+        Err(error @ BakeError::Psnr { .. }) => {
+            return usual(options.source().storage).ok().filter(|usual| reaches(goal, usual)).ok_or(error);
+        }
         found => found?,
     };
     let Some(storage) = found.contested else { return Ok(found) };
     let Ok(usual) = usual(storage) else { return Ok(found) };
     let memory = found.report.memory.workspace.max(MOST_MEMORY);
     let wins = reaches(goal, &usual) && usual.report.memory.workspace <= memory && better(goal, seen, &usual, &found)?;
-    let mut best = if wins { usual } else { found };
-    if let Goal::Budget(budget) = goal
-        && wins
-        && storage != asked
-    {
-        best.report.warnings.push(tune::packed(budget, best.report.memory.picture));
-    }
-    Ok(best)
+    Ok(if wins { usual } else { found })
 }
 
 fn reaches(goal: Goal, usual: &Baked) -> bool {

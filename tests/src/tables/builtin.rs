@@ -3,10 +3,9 @@
 
 use super::{Table, baked, markdown, number};
 use anyhow::{Context, Result, bail};
-use cubist_baker::Options;
 use cubist_baker::job::Baked;
 use cubist_baker::scene::Scene;
-use cubist_baker::{Report, TruthFrames};
+use cubist_baker::{Options, Report, TruthFrames};
 use cubist_core::Bundle;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};

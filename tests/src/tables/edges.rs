@@ -4,13 +4,12 @@
 use super::{Table, baked, markdown, number};
 use crate::play;
 use anyhow::Result;
-use cubist_baker::Options;
-use cubist_baker::TruthFrames;
 use cubist_baker::job::Baked;
 use cubist_baker::metrics;
 use cubist_baker::scene::Scene;
 use cubist_baker::truth::{Truth, spread};
 use cubist_baker::verify::rgb;
+use cubist_baker::{Options, TruthFrames};
 use cubist_core::Player;
 use serde_json::{Value, json};
 use std::time::{Duration, Instant};
