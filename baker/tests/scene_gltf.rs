@@ -395,7 +395,24 @@ fn broken_textures_name_their_material() {
     // Without a picture we read, the model still shows, and says what is missing.
     b.json["textures"][0] = json!({ "extensions": { "KHR_texture_basisu": { "source": 0 } } });
     let scene = b.load().unwrap();
-    assert!(scene.warnings.iter().any(|w| w.contains("no PNG or JPEG")), "{:?}", scene.warnings);
+    assert!(scene.warnings.iter().any(|w| w.contains("no PNG, JPEG or WebP")), "{:?}", scene.warnings);
+}
+
+#[test]
+fn pictures_may_be_webp() {
+    let mut b = square();
+    let mut webp = std::io::Cursor::new(Vec::new());
+    image::DynamicImage::new_rgb8(4, 2).write_to(&mut webp, image::ImageFormat::WebP).unwrap();
+    let view = b.view(webp.get_ref());
+    b.push("images", json!({ "bufferView": view, "mimeType": "image/webp" }));
+    b.push("textures", json!({ "extensions": { "EXT_texture_webp": { "source": 0 } } }));
+    b.push("materials", json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": 0 } } }));
+    b.list("meshes")[0]["primitives"][0]["material"] = json!(0);
+    b.json["extensionsRequired"] = json!(["EXT_texture_webp"]);
+    b.json["extensionsUsed"] = json!(["EXT_texture_webp"]);
+    let scene = b.load().unwrap();
+    assert!(scene.textures.iter().any(|t| (t.width, t.height) == (4, 2)));
+    assert!(scene.warnings.iter().all(|w| !w.contains("picture") && !w.contains("webp")), "{:?}", scene.warnings);
 }
 
 #[test]

@@ -23,12 +23,29 @@ fn too_large(texels: u64) -> String {
     )
 }
 
-/// A reader of a PNG, JPEG or GIF.
+/// What is read.
+const KINDS: &str = "PNG, JPEG, GIF, BMP, TGA or WebP";
+
+/// Whether this may be a TGA: the one kind that does not say what it is. Its header's first bytes have few values, which belong together.
+fn is_tga(bytes: &[u8]) -> bool {
+    let Some(&[_, map, kind, .., depth, order]) = bytes.first_chunk::<18>() else { return false };
+    let colours = matches!(
+        (map, kind & !8, depth),
+        // With a colour map, without one, and grey; 8 more where runs are coded.
+        (1, 1, 8) | (0, 2, 15 | 16 | 24 | 32) | (0 | 1, 3, 8 | 16)
+    );
+    colours && order & 0xc0 == 0
+}
+
+/// A reader of a picture.
 fn open(bytes: &[u8]) -> Result<ImageReader<Cursor<&[u8]>>, String> {
-    let reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
+    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|e| e.to_string())?;
+    if reader.format().is_none() && is_tga(bytes) {
+        reader.set_format(ImageFormat::Tga);
+    }
     match reader.format() {
         Some(_) => Ok(reader),
-        None => Err("not a picture; expected PNG, JPEG or GIF: convert it".to_owned()),
+        None => Err(format!("not a picture; expected {KINDS}: convert it")),
     }
 }
 
@@ -36,7 +53,7 @@ fn open(bytes: &[u8]) -> Result<ImageReader<Cursor<&[u8]>>, String> {
 fn broken(error: image::ImageError, texels: u64) -> String {
     match error {
         image::ImageError::Limits(_) => too_large(texels),
-        image::ImageError::Unsupported(e) => format!("{e}; expected PNG, JPEG or GIF: convert it"),
+        image::ImageError::Unsupported(e) => format!("{e}; expected {KINDS}: convert it"),
         e => format!("the picture is broken ({e}): export it again"),
     }
 }
@@ -48,7 +65,7 @@ fn ends(bytes: &[u8]) -> bool {
     scan.is_none_or(|scan| scan.windows(2).any(marker(0xd9)))
 }
 
-/// Decodes a PNG, JPEG or GIF (its first picture) of at most `texels` texels, within the limits of sides and bytes.
+/// Decodes a picture (the first, if there are several) of at most `texels` texels, within the limits of sides and bytes.
 pub(crate) fn decode(bytes: &[u8], texels: u64) -> Result<DynamicImage, String> {
     // As it says of itself, before room is made for it.
     let (width, height) = open(bytes)?.into_dimensions().map_err(|e| broken(e, texels))?;
@@ -123,6 +140,29 @@ mod tests {
         let small = reduce(&Texture { width: 4, height: 3, texels, wrap: [Wrap::Clamp; 2] }, 2).unwrap();
         assert_eq!((small.width, small.height), (2, 2));
         assert_eq!(small.texels, [[25, 0, 0, 255], [45, 0, 0, 255], [85, 0, 0, 255], [105, 0, 0, 255]]);
+    }
+
+    #[test]
+    fn every_kind_is_known_by_its_bytes() {
+        let picture = DynamicImage::ImageRgba8(image::RgbaImage::from_fn(8, 4, |x, y| image::Rgba([x as u8 * 30, y as u8 * 60, 7, 255])));
+        let read = |kind: ImageFormat, picture: &DynamicImage| {
+            let mut bytes = Cursor::new(Vec::new());
+            picture.write_to(&mut bytes, kind).unwrap();
+            texture(bytes.get_ref(), [Wrap::Clamp; 2], &[])
+                .map(|texture| ((texture.width, texture.height), texture.texels, bytes.into_inner()))
+        };
+        let (size, texels, _) = read(ImageFormat::Png, &picture).unwrap();
+        let opaque = picture.to_rgb8().into();
+        for kind in [ImageFormat::Bmp, ImageFormat::Tga, ImageFormat::WebP] {
+            let (same_size, same_texels, bytes) = read(kind, &opaque).unwrap();
+            assert_eq!((same_size, same_texels), (size, texels.clone()), "{kind:?}");
+            let short = texture(&bytes[..bytes.len() / 2], [Wrap::Clamp; 2], &[]);
+            assert!(short.unwrap_err().contains("broken"), "{kind:?}");
+        }
+        let (_, grey, _) = read(ImageFormat::Tga, &picture.grayscale()).unwrap();
+        assert!(grey.iter().all(|&[r, g, b, _]| r == g && g == b));
+        let text = texture(b"v 1 2 3 and other lines of text", [Wrap::Clamp; 2], &[]);
+        assert!(text.unwrap_err().contains("not a picture; expected PNG, JPEG, GIF, BMP, TGA or WebP"));
     }
 
     #[test]

@@ -6,7 +6,8 @@ use ::gltf::json::Root;
 use serde_json::Value;
 
 /// Extensions that a file may require: shown, or without influence on what is shown.
-const TAKEN: &[&str] = &["KHR_materials_unlit", "KHR_texture_transform", "KHR_mesh_quantization", "KHR_materials_pbrSpecularGlossiness"];
+const TAKEN: &[&str] =
+    &["KHR_materials_unlit", "KHR_texture_transform", "KHR_mesh_quantization", "KHR_materials_pbrSpecularGlossiness", "EXT_texture_webp"];
 /// Extensions whose part of the look is dropped, with a warning.
 const DROPPED: &[&str] = &[
     "KHR_materials_emissive_strength",
@@ -54,8 +55,11 @@ pub(crate) fn parse(bytes: &[u8], warnings: &mut Warnings) -> Result<Shell, Stri
     let animated_cameras = drop_pointers(&mut value, warnings);
     for (i, texture) in array(&mut value, "textures").into_iter().flatten().enumerate() {
         if let Some(t) = texture.as_object_mut().filter(|t| !t.contains_key("source")) {
-            t.insert("source".to_owned(), Value::from(NO_IMAGE));
-            warnings.add(format!("texture {i} has no PNG or JPEG picture: drawn without it"));
+            let webp = t.get("extensions").and_then(|e| e.pointer("/EXT_texture_webp/source")).cloned();
+            if webp.is_none() {
+                warnings.add(format!("texture {i} has no PNG, JPEG or WebP picture: drawn without it"));
+            }
+            t.insert("source".to_owned(), webp.unwrap_or(Value::from(NO_IMAGE)));
         }
     }
     // Read from text: sixty types read from values would make a twelfth of this crate's code. The text is not the user's, nor is a place in it.
