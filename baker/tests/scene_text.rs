@@ -81,7 +81,7 @@ fn obj_faults_name_file_and_line() {
         let e = with(&[("a.obj", text.as_bytes())], "a.obj").unwrap_err();
         assert!(e.contains(expected), "expected \"{expected}\" in: {e}");
     }
-    assert!(with(&[("a.obj", b"\xff\xfe\x00v")], "a.obj").is_err());
+    assert!(with(&[("a.obj", b"\xff\xfev\0 \0")], "a.obj").unwrap_err().contains("a.obj: text in UTF-16; expected UTF-8"));
 }
 
 const HEAD: &str = "element vertex 4\nproperty float x\nproperty float y\nproperty double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
@@ -137,6 +137,7 @@ fn ply_faults_are_errors() {
         (ascii("element vertex 1\nproperty float x\n", "0\n"), "no property y"),
         (many, "need at least"),
         (empty, "without properties"),
+        (ascii("made by a tool\n", ""), "header: Line 3: Couldn't parse line. String: 'made by a tool ': expected a PLY file"),
         (b"plx\n".to_vec(), "header"),
         (Vec::new(), "header"),
     ] {

@@ -13,9 +13,13 @@ use std::path::{Path, PathBuf};
 /// Loads an .obj file; `texture` serves a file whose materials name none.
 pub(crate) fn load(path: &Path, texture: Option<&Path>) -> Result<Model, SceneError> {
     let bytes = read_file(path).map_err(|what| SceneError::Read { file: path.to_owned(), what })?;
+    let error = |what| SceneError::Model { file: path.to_owned(), what };
+    if bytes.starts_with(b"\xfe\xff") || bytes.starts_with(b"\xff\xfe") {
+        return Err(error("text in UTF-16; expected UTF-8: save it as that".to_owned()));
+    }
     // Names in other encodings are common; the numbers are ASCII whatever the encoding.
     let text = String::from_utf8_lossy(&bytes);
-    model(&text, path.parent().unwrap_or(Path::new("")), texture).map_err(|what| SceneError::Model { file: path.to_owned(), what })
+    model(&text, path.parent().unwrap_or(Path::new("")), texture).map_err(error)
 }
 
 fn model(text: &str, folder: &Path, fallback: Option<&Path>) -> Result<Model, String> {

@@ -142,7 +142,9 @@ fn model(bytes: &[u8], folder: &Path, fallback: Option<&Path>) -> Result<Model, 
     let mut model = Model::default();
     let mut reader = Reader::new(bytes);
     let flat = |e: ply_rs_bw::parser::ParseError| {
-        e.to_string().split_whitespace().collect::<Vec<_>>().join(" ").chars().take(300).collect::<String>()
+        let told = e.to_string().split_whitespace().collect::<Vec<_>>().join(" ");
+        // What its grammar was about to read is of no use.
+        told.split(" Error: ParseError").next().unwrap_or_default().chars().take(300).collect::<String>()
     };
     let header = Parser::<Nothing>::new().read_header(&mut reader).map_err(|e| format!("header: {}: expected a PLY file", flat(e)))?;
     let (mut vertices, mut faces, mut strips) = (Vec::new(), Vec::new(), Vec::new());
