@@ -166,6 +166,26 @@ mod tests {
     }
 
     #[test]
+    fn damaged_pictures_are_errors_or_show_something() {
+        let picture = DynamicImage::ImageRgb8(image::RgbImage::from_fn(9, 5, |x, y| image::Rgb([x as u8 / 3 * 90, y as u8 * 50, 7])));
+        for kind in [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Gif, ImageFormat::Bmp, ImageFormat::Tga, ImageFormat::WebP] {
+            let mut whole = Cursor::new(Vec::new());
+            picture.write_to(&mut whole, kind).unwrap();
+            let whole = whole.into_inner();
+            let mut refused = 0;
+            for at in 0..whole.len() {
+                refused += u32::from(decode(&whole[..at], 1 << 12).is_err());
+                for value in [0, 1, 0x7f, 0x80, 0xff, !whole[at]] {
+                    let mut damaged = whole.clone();
+                    damaged[at] = value;
+                    refused += u32::from(decode(&damaged, 1 << 12).is_err());
+                }
+            }
+            assert!(refused > 0, "{kind:?}");
+        }
+    }
+
+    #[test]
     fn a_jpeg_that_was_cut_short_is_refused() {
         let mut bytes = Cursor::new(Vec::new());
         let noise = image::RgbImage::from_fn(64, 64, |x, y| image::Rgb([((x * 37) ^ (y * 91)) as u8, (x * y) as u8, (x + y) as u8]));
