@@ -81,7 +81,11 @@ fn obj_faults_name_file_and_line() {
         let e = with(&[("a.obj", text.as_bytes())], "a.obj").unwrap_err();
         assert!(e.contains(expected), "expected \"{expected}\" in: {e}");
     }
-    assert!(with(&[("a.obj", b"\xff\xfev\0 \0")], "a.obj").unwrap_err().contains("a.obj: text in UTF-16; expected UTF-8"));
+    for utf16 in [b"\xff\xfe\x00v", b"\xfe\xff\x00v"] {
+        let e = with(&[("a.obj", utf16)], "a.obj").unwrap_err();
+        assert!(e.contains("a.obj: text in UTF-16; expected UTF-8"), "{e}");
+    }
+    assert!(with(&[("a.obj", b"\xff\x00v")], "a.obj").is_err());
 }
 
 const HEAD: &str = "element vertex 4\nproperty float x\nproperty float y\nproperty double z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n";
