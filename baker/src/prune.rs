@@ -22,6 +22,8 @@ const SEEN: f32 = 64.0;
 /// The least squared error of a pixel that is seen to be another: a sheet ends at its cell's border where it is left out, and a straight cut through an
 /// outline is seen however little the colours differ, as those of a dark thing before a dark background do.
 const CUT: f32 = 1500.0;
+/// The least squared error of a pixel where several sheets are left: outlines are fitted to where they are seen, so which of them shows here is not told.
+const UNTOLD: f32 = 500.0;
 /// Rounds in which the price of a layer rises to the whole of it: what is worth least goes first.
 const ROUNDS: u16 = 8;
 
@@ -135,8 +137,12 @@ fn losses(gbuffer: &GBuffer, image: &SourceImage, grid: &KeyGrid, index: usize, 
                 let on = [0, 1].map(|k| edge[k] + (edge[k] - further[k]) * f32::from(far));
                 let error = mean_squared_error(&image.colour_at(uv), &image.colour_at(on)) as f32;
                 let error = if error > SEEN { error.max(CUT) } else { error };
-                // Beyond its chart it shows only where nothing else is left to be seen.
-                if list.len() > 2 && !image.covered_at(on) { error.max(LOST) } else { error }
+                match list.len() {
+                    ..=2 => error,
+                    _ if image.covered_at(on) => error.max(UNTOLD),
+                    // Beyond its chart it shows only where nothing else is left to be seen.
+                    _ => error.max(LOST),
+                }
             });
         }
     }
@@ -248,6 +254,27 @@ mod tests {
         }
         // Where pictures are far off it goes all the same: 16 pixels of 1,500 are 24,000, which an error of 287 asks for.
         assert_eq!(left(1, [100, 109], 290.0), (vec![1], 16));
+    }
+
+    #[test]
+    fn where_others_are_left_the_right_one_may_not_show() {
+        // A third chart along the bottom of the first cell, and all of one grey.
+        let (mut gbuffer, grid) = scene(1);
+        for pixel in (0..2 * 256).filter(|pixel| pixel % 16 < 8 && pixel / 16 % 16 == 7) {
+            gbuffer.label[pixel] = 3;
+            std::sync::Arc::make_mut(&mut gbuffer.uv)[pixel] = [(pixel % 16) as f32 + 30.5, 0.5];
+        }
+        let mut image = image([100, 100]);
+        image.labels.push(Label { rect: [30, 0, 38, 8], masked: false, fixed: None });
+        let left = |error: f64| {
+            let mut sheets = crate::sheets::find(&gbuffer, &grid, 1);
+            prune(&mut sheets, &gbuffer, &image, &grid, error);
+            sheets.lists[0].clone()
+        };
+        // 34 layers, of which each line has 8: with an error of 120 a line is to save 7,659, and 16 pixels of 500 are 8,000.
+        assert_eq!(left(120.0).len(), 3);
+        // Where one goes, so does the other: what is left then is all there is to see.
+        assert_eq!(left(150.0), [1]);
     }
 
     #[test]
