@@ -22,7 +22,7 @@ const SEEN: f32 = 64.0;
 /// The least squared error of a pixel that is seen to be another: a sheet ends at its cell's border where it is left out, and a straight cut through an
 /// outline is seen however little the colours differ, as those of a dark thing before a dark background do.
 const CUT: f32 = 1500.0;
-/// The least squared error of a pixel where several sheets are left: outlines are fitted to where they are seen, so which of them shows here is not told.
+/// The least squared error of a pixel where several sheets are left: their outlines are fitted to where these are seen, and do not tell which shows here.
 const UNTOLD: f32 = 500.0;
 /// Rounds in which the price of a layer rises to the whole of it: what is worth least goes first.
 const ROUNDS: u16 = 8;
