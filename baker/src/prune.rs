@@ -226,10 +226,14 @@ mod tests {
         }
     }
 
+    fn pruned((gbuffer, grid): &(GBuffer, KeyGrid), image: &SourceImage, error: f64) -> Sheets {
+        let mut sheets = crate::sheets::find(gbuffer, grid, 1);
+        prune(&mut sheets, gbuffer, image, grid, error);
+        sheets
+    }
+
     fn left(line: u32, greys: [u8; 2], error: f64) -> (Vec<u8>, u64) {
-        let (gbuffer, grid) = scene(line);
-        let mut sheets = crate::sheets::find(&gbuffer, &grid, 1);
-        prune(&mut sheets, &gbuffer, &image(greys), &grid, error);
+        let sheets = pruned(&scene(line), &image(greys), error);
         (sheets.lists[0].clone(), sheets.dropped)
     }
 
@@ -259,18 +263,15 @@ mod tests {
     #[test]
     fn where_others_are_left_the_right_one_may_not_show() {
         // A third chart along the bottom of the first cell, and all of one grey.
-        let (mut gbuffer, grid) = scene(1);
+        let mut scene = scene(1);
+        let gbuffer = &mut scene.0;
         for pixel in (0..2 * 256).filter(|pixel| pixel % 16 < 8 && pixel / 16 % 16 == 7) {
             gbuffer.label[pixel] = 3;
             std::sync::Arc::make_mut(&mut gbuffer.uv)[pixel] = [(pixel % 16) as f32 + 30.5, 0.5];
         }
         let mut image = image([100, 100]);
         image.labels.push(Label { rect: [30, 0, 38, 8], masked: false, fixed: None });
-        let left = |error: f64| {
-            let mut sheets = crate::sheets::find(&gbuffer, &grid, 1);
-            prune(&mut sheets, &gbuffer, &image, &grid, error);
-            sheets.lists[0].clone()
-        };
+        let left = |error: f64| pruned(&scene, &image, error).lists[0].clone();
         // 34 layers, of which each line has 8: with an error of 120 a line is to save 7,659, and 16 pixels of 500 are 8,000.
         assert_eq!(left(120.0).len(), 3);
         // Where one goes, so does the other: what is left then is all there is to see.
@@ -288,12 +289,9 @@ mod tests {
     #[test]
     fn what_goes_on_where_a_sheet_was_is_looked_up_there() {
         // Chart 1 is lighter along its top, as chart 2 is: without chart 2 it shows the same.
-        let (gbuffer, grid) = scene(1);
         let mut image = image([100, 255]);
         image.texels[..20].fill(1);
-        let mut sheets = crate::sheets::find(&gbuffer, &grid, 1);
-        prune(&mut sheets, &gbuffer, &image, &grid, 13.0);
-        assert_eq!(sheets.lists[0], [1]);
+        assert_eq!(pruned(&scene(1), &image, 13.0).lists[0], [1]);
     }
 
     #[test]
