@@ -36,6 +36,15 @@ fn obj_with_materials_textures_and_quads() {
 }
 
 #[test]
+fn a_model_with_a_small_print_gets_a_light() {
+    let obj = format!("mtllib m.mtl\n{QUAD}v 9 0 0\nusemtl paint\nf 1 5 3\nusemtl print\nf 1/1 2/2 3/3\n");
+    let mtl = b"newmtl paint\nKd 1 0.5 0\nnewmtl print\nmap_Kd wall.png\n";
+    let scene = with(&[("a.obj", obj.as_bytes()), ("m.mtl", mtl), ("wall.png", &save_png([9, 8, 7]))], "a.obj").unwrap();
+    assert_eq!((scene.textures.len(), scene.lights.len()), (1, 1));
+    assert!(scene.warnings.iter().any(|w| w.starts_with("most of the model has neither textures")), "{:?}", scene.warnings);
+}
+
+#[test]
 fn paths_from_the_root_lead_to_files_beside_the_model() {
     let obj = format!("mtllib C:\\models\\a.mtl\n{QUAD}usemtl wall\nf 1/1 2/2 3/3\n");
     let files: [(&str, &[u8]); 3] =

@@ -63,7 +63,7 @@ impl Overrides {
 
 /// Loads a scene file (.toml) or a model alone (.glb .gltf .obj .ply). A model alone gets a full-circle, looping orbit
 /// around its bounding sphere at 20 degrees of elevation, 320 x 240 pixels, 120 frames at 30 frames per second, and one
-/// light if it has neither textures nor vertex colours.
+/// light if most of it has neither textures nor vertex colours.
 ///
 /// # Errors
 /// Anything wrong with the file or with what it names: see [`SceneError`].
@@ -130,9 +130,12 @@ fn alone(path: &Path, overrides: &Overrides) -> Result<Scene, SceneError> {
     let playback = overrides.apply(Playback { looping: true, ..PLAYBACK })?;
     let camera = shared(turntable(&model, &playback, FOV, DVec3::Y));
     let mut lights = Vec::new();
-    if model.textures.is_empty() && !model.coloured {
+    if model.mostly_plain() {
         lights.push(Light { direction: Vec3::new(-1.0, -2.0, -1.0).normalize(), colour: Vec3::ONE, intensity: 1.0 });
-        model.warnings.add("the model has neither textures nor vertex colours: one light along [-1, -2, -1] added so that its shape shows");
+        let of_it = if model.textures.is_empty() { "the model" } else { "most of the model" };
+        model
+            .warnings
+            .add(format!("{of_it} has neither textures nor vertex colours: one light along [-1, -2, -1] added so that its shape shows"));
     }
     Ok(Scene {
         name: name(path),

@@ -81,6 +81,13 @@ impl Model {
         Ok(self)
     }
 
+    /// Whether more than three quarters of its surface would show nothing but its outline without light.
+    pub(crate) fn mostly_plain(&self) -> bool {
+        let textured = |t: &Triangle| self.materials.get(t.material as usize).is_some_and(|m| m.texture.is_some());
+        let area = |of: &dyn Fn(&Triangle) -> bool| self.triangles.iter().filter(|t| of(t)).map(|t| area(&t.position)).sum::<f64>();
+        !self.coloured && area(&textured) < area(&|_| true) / 4.0
+    }
+
     /// The path of the camera called `name`.
     pub(crate) fn camera(&self, name: &str) -> Result<ModelPath, String> {
         if let Some(camera) = self.cameras.iter().find(|c| c.names.iter().any(|n| n == name)) {
@@ -104,9 +111,14 @@ pub(crate) fn shared(path: impl Path + 'static) -> Arc<dyn Path> {
     Arc::new(path)
 }
 
+/// Twice a triangle's area.
+fn area(p: &[DVec3; 3]) -> f64 {
+    (p[1] - p[0]).cross(p[2] - p[0]).length()
+}
+
 /// Whether a triangle's height is below a millionth of a millionth of its longest side: no ray can be said to hit it.
 fn is_degenerate(p: &[DVec3; 3]) -> bool {
     let (a, b) = (p[1] - p[0], p[2] - p[0]);
     let longest = a.length_squared().max(b.length_squared()).max((b - a).length_squared());
-    a.cross(b).length() <= 1e-12 * longest
+    area(p) <= 1e-12 * longest
 }

@@ -112,6 +112,7 @@ fn check(text: &str, warnings: &mut Warnings) -> Result<String, String> {
             }
             "f" => {
                 let mut corners = 0;
+                let start = clean.len();
                 clean.push('f');
                 for corner in rest.split_whitespace() {
                     corners += 1;
@@ -134,8 +135,14 @@ fn check(text: &str, warnings: &mut Warnings) -> Result<String, String> {
                     }
                     clean.push_str(&format!(" {}/{}/{}", parsed[0], parsed[1].saturating_add(1), parsed[2].saturating_add(1)));
                 }
-                if corners < 3 {
+                if corners < 2 {
                     return Err(format!("line {place}: a face of {corners} corners; expected at least 3"));
+                }
+                // As old exporters write loose edges.
+                if corners == 2 {
+                    clean.truncate(start);
+                    warnings.add("faces of two corners are not shown");
+                    continue;
                 }
                 triangles += corners - 2;
             }
@@ -305,7 +312,16 @@ mod tests {
         assert!(check("v 0 0 0\nf 1/x 1 1\n").unwrap_err().starts_with("line 2: \"1/x\""));
         assert!(check("v 0 nan 0\n").unwrap_err().starts_with("line 1"));
         assert!(check("v 0 0 0\nf -1 -2 -1\n").unwrap_err().contains("index -2 of 1 vertices so far"));
+        assert!(check("v 0 0 0\nf 1\n").unwrap_err().starts_with("line 2: a face of 1 corners"));
         assert_eq!(check("v 0 0 0 1 # w\nv 1 0 \\\n0\nf 1 2 -1\n").unwrap(), "vt 0 1\nvn 0 0 0\nv 0 0 0\nv 1 0 0\nf 1/1/1 2/1/1 2/1/1\n");
+    }
+
+    #[test]
+    fn faces_of_two_corners_are_left_out() {
+        let mut warnings = Warnings::default();
+        let text = check("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\nf 1 2 3\n", &mut warnings).unwrap();
+        assert!(!text.contains("f 1/1/1 2/1/1\n") && text.ends_with("f 1/1/1 2/1/1 3/1/1\n"), "{text}");
+        assert_eq!(warnings.into_vec(), ["faces of two corners are not shown"]);
     }
 
     #[test]
