@@ -24,7 +24,7 @@ fn too_large(texels: u64) -> String {
 }
 
 /// What is read.
-const KINDS: &str = "PNG, JPEG, GIF, BMP, TGA or WebP";
+const KINDS: &str = "PNG, JPEG, GIF, BMP, TGA, TIFF, DDS or WebP";
 
 /// Whether this may be a TGA: the one kind that does not say what it is. Its header's first bytes have few values, which belong together.
 fn is_tga(bytes: &[u8]) -> bool {
@@ -153,7 +153,7 @@ mod tests {
         };
         let (size, texels, _) = read(ImageFormat::Png, &picture).unwrap();
         let opaque = picture.to_rgb8().into();
-        for kind in [ImageFormat::Bmp, ImageFormat::Tga, ImageFormat::WebP] {
+        for kind in [ImageFormat::Bmp, ImageFormat::Tga, ImageFormat::Tiff, ImageFormat::WebP] {
             let (same_size, same_texels, bytes) = read(kind, &opaque).unwrap();
             assert_eq!((same_size, same_texels), (size, texels.clone()), "{kind:?}");
             let short = texture(&bytes[..bytes.len() / 2], [Wrap::Clamp; 2], &[]);
@@ -162,16 +162,44 @@ mod tests {
         let (_, grey, _) = read(ImageFormat::Tga, &picture.grayscale()).unwrap();
         assert!(grey.iter().all(|&[r, g, b, _]| r == g && g == b));
         let text = texture(b"v 1 2 3 and other lines of text", [Wrap::Clamp; 2], &[]);
-        assert!(text.unwrap_err().contains("not a picture; expected PNG, JPEG, GIF, BMP, TGA or WebP"));
+        assert!(text.unwrap_err().contains("not a picture; expected PNG, JPEG, GIF, BMP, TGA, TIFF, DDS or WebP"));
+    }
+
+    /// A DDS of one block of 4 x 4 texels, red above blue (DXT1).
+    fn dds() -> Vec<u8> {
+        const FLAGS: u32 = 0x1007;
+        let mut header = [0u32; 32];
+        header[0] = u32::from_le_bytes(*b"DDS ");
+        (header[1], header[2], header[3], header[4]) = (124, FLAGS, 4, 4);
+        (header[19], header[20], header[21]) = (32, 4, u32::from_le_bytes(*b"DXT1"));
+        let block = [0xf800_u16.to_le_bytes(), 0x001f_u16.to_le_bytes(), [0, 0], [0x55, 0x55]];
+        header.iter().flat_map(|word| word.to_le_bytes()).chain(block.into_iter().flatten()).collect()
+    }
+
+    #[test]
+    fn blocks_of_texels_are_read() {
+        let read = texture(&dds(), [Wrap::Clamp; 2], &[]).unwrap();
+        assert_eq!((read.width, read.height, read.texels[0], read.texels[15]), (4, 4, [255, 0, 0, 255], [0, 0, 255, 255]));
     }
 
     #[test]
     fn damaged_pictures_are_errors_or_show_something() {
         let picture = DynamicImage::ImageRgb8(image::RgbImage::from_fn(9, 5, |x, y| image::Rgb([x as u8 / 3 * 90, y as u8 * 50, 7])));
-        for kind in [ImageFormat::Png, ImageFormat::Jpeg, ImageFormat::Gif, ImageFormat::Bmp, ImageFormat::Tga, ImageFormat::WebP] {
+        let written = |kind: ImageFormat| {
             let mut whole = Cursor::new(Vec::new());
             picture.write_to(&mut whole, kind).unwrap();
-            let whole = whole.into_inner();
+            (whole.into_inner(), kind)
+        };
+        let kinds = [
+            ImageFormat::Png,
+            ImageFormat::Jpeg,
+            ImageFormat::Gif,
+            ImageFormat::Bmp,
+            ImageFormat::Tga,
+            ImageFormat::Tiff,
+            ImageFormat::WebP,
+        ];
+        for (whole, kind) in kinds.into_iter().map(written).chain([(dds(), ImageFormat::Dds)]) {
             let mut refused = 0;
             for at in 0..whole.len() {
                 refused += u32::from(decode(&whole[..at], 1 << 12).is_err());
