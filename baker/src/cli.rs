@@ -130,7 +130,7 @@ pub struct Bake {
     pub colours: Option<u16>,
     /// How the bundle holds the source image [default: raw].
     ///
-    /// Raw plays straight from flash, at no memory. Packed takes a tenth to a quarter of the bytes and is unpacked once, before the first frame,
+    /// Raw plays straight from flash, at no memory. Packed takes a tenth to a third of the bytes and is unpacked once, before the first frame,
     /// into memory: a byte a texel and the mask, at some hundred instructions each. Where flash is slow and memory is not, as on
     /// an RP2040, drawing can then be faster. With --budget the search may pack what does not fit raw, unless this is given; --ram counts it.
     #[arg(long, value_enum, value_name = "KIND")]

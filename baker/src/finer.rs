@@ -55,7 +55,7 @@ impl Other {
         // Either alone keeps both as they are usually.
         let way = if *cell == made.settings.cell { format!("--key-interval {key_interval}") } else { format!("--cell {cell}") };
         format!(
-            "{why}: --cell {} --key-interval {} are used, {}; with {cell} and {key_interval} it were {told}: give {way} for that",
+            "{why}: --cell {} --key-interval {} are used, {}; with {cell} and {key_interval} it would be {told}: give {way} for that",
             made.settings.cell,
             made.settings.key_interval,
             made.told(),

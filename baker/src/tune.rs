@@ -454,7 +454,7 @@ mod tests {
         assert!(raw.source_image.storage == Storage::Raw && raw.memory.picture == 0 && !told(&raw));
         let psnr = |report: &crate::Report| report.quality_vs_truth.unwrap().psnr_mean;
         assert!(psnr(&open) > psnr(&raw), "{} {}", psnr(&open), psnr(&raw));
-        // Where there is room, flash is where the picture stays, and nothing is worse than it were without a budget.
+        // Where there is room, flash is where the picture stays, and nothing is worse than it would be without a budget.
         let (_, wide) = bake(Goal::Budget(plain.len() as u64 * 4), None);
         assert!(wide.source_image.storage == Storage::Raw && !told(&wide));
         assert!(psnr(&wide) >= psnr(&usual), "{} {}", psnr(&wide), psnr(&usual));

@@ -1,11 +1,12 @@
 //! Hands the linker `memory.x` and the boot loader's second stage, and the compiler two bundles: the test card, and the one that CUBIST_BUNDLE
 //! names, if it does: that one is linked in, and plays whatever lies in flash.
 
+#[path = "../bundle.rs"]
+mod bundle;
 #[path = "../link.rs"]
 mod link;
 
 use std::fmt::Write;
-use std::path::PathBuf;
 
 /// Sets up the flash as it is on a Pico, before anything else runs.
 const BOOT2: &[u8; 256] = &rp2040_boot2::BOOT_LOADER_W25Q080;
@@ -18,13 +19,5 @@ fn main() -> std::io::Result<()> {
         let _written = writeln!(script, "    LONG({:#010x})", u32::from_le_bytes(*word));
     }
     std::fs::write(out.join("memory.x"), script + "  } > BOOT2\n} INSERT BEFORE .text;\n")?;
-    println!("cargo:rerun-if-env-changed=CUBIST_BUNDLE");
-    let bundle = match std::env::var_os("CUBIST_BUNDLE") {
-        Some(path) => {
-            println!("cargo:rerun-if-changed={}", PathBuf::from(&path).display());
-            std::fs::read(path)?
-        }
-        None => Vec::new(),
-    };
-    std::fs::write(out.join("bundle.cubist"), bundle)
+    bundle::copy(&out)
 }
