@@ -63,7 +63,7 @@ pub fn find(scene: &Scene, hits: &Hits, gbuffer: &GBuffer, labels: usize) -> Vec
 /// The plane through three samples that lie far apart, if all others lie in it where they should.
 fn flat_chart(seen: &[([f64; 2], DVec3)]) -> Option<FlatChart> {
     let &(first, start) = seen.first()?;
-    let apart = |[a, b]: [f64; 2]| (a - first[0]).hypot(b - first[1]);
+    let apart = |[a, b]: [f64; 2]| libm::hypot(a - first[0], b - first[1]);
     let &(second, next) = seen.iter().max_by(|a, b| apart(a.0).total_cmp(&apart(b.0)))?;
     let area = |[a, b]: [f64; 2]| (second[0] - first[0]) * (b - first[1]) - (second[1] - first[1]) * (a - first[0]);
     let &(third, last) = seen.iter().max_by(|a, b| area(a.0).abs().total_cmp(&area(b.0).abs()))?;
@@ -96,7 +96,7 @@ pub fn positions(charts: &[Option<FlatChart>], layers: &Layers, lenses: &[Lens],
             let place = |chart: FlatChart| {
                 let [at, left, right, up, down] = directions.map(|direction| chart.seen(lens.eye, direction));
                 let at = at?;
-                let bend = |a: [f64; 2], b: [f64; 2]| (a[0] + b[0] - 2.0 * at[0]).hypot(a[1] + b[1] - 2.0 * at[1]) / BEND;
+                let bend = |a: [f64; 2], b: [f64; 2]| libm::hypot(a[0] + b[0] - 2.0 * at[0], a[1] + b[1] - 2.0 * at[1]) / BEND;
                 let (across, along) = (bend(left?, right?), bend(up?, down?));
                 Some((at.map(|x| x as f32), (1.0 / (1.0 + across * across + along * along)) as f32))
             };

@@ -27,7 +27,7 @@ pub struct FrameImage<'p, 'a, T = Indexed8> {
 
 impl<'a, T: Texels> Player<'a, T> {
     /// The current frame as an embedded-graphics image; `row` is a buffer of at least the screen's
-    /// width (pixels past a shorter one are not drawn). The player's byte order must be native.
+    /// width (pixels past a shorter one are not drawn). Its colours are right whatever the player's byte order is.
     pub fn image<'p>(&'p mut self, row: &'p mut [u16]) -> FrameImage<'p, 'a, T> {
         let size = self.bundle().size_of_screen();
         FrameImage { state: RefCell::new((self, row)), size }
@@ -68,9 +68,11 @@ impl<T: Texels> ImageDrawable for FrameImage<'_, '_, T> {
         let (left, top) = (area.top_left.x.max(0) as usize, area.top_left.y.max(0) as u32);
         let drawn = buffer.len().min(self.size.width as usize);
         let Some(row) = buffer.get_mut(..drawn) else { return Ok(()) };
+        let swapped = player.swapped();
+        let native = |raw: u16| if swapped { raw.swap_bytes() } else { raw };
         for down in 0..area.size.height {
             player.row(top.wrapping_add(down), row);
-            let colours = row.iter().skip(left).take(area.size.width as usize).map(|&raw| Rgb565::from(RawU16::new(raw)));
+            let colours = row.iter().skip(left).take(area.size.width as usize).map(|&raw| Rgb565::from(RawU16::new(native(raw))));
             let line = Rectangle::new(Point::new(0, down as i32), Size::new(colours.len() as u32, 1));
             target.fill_contiguous(&line, colours)?;
         }

@@ -125,7 +125,7 @@ mod span;
 mod texels;
 pub mod timeline;
 mod torn;
-pub mod window;
+mod window;
 mod work;
 
 pub use bundle::{Bundle, checksum};
@@ -134,4 +134,5 @@ pub use graphics::FrameImage;
 pub use player::Player;
 pub use playing::{ByteOrder, Frame};
 pub use texels::{AnyTexels, Direct565, Indexed4, Indexed8, Spread8, Texels};
+pub use window::Window;
 pub use work::{Probe, Work};

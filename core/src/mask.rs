@@ -82,11 +82,17 @@ impl Mask<'_> {
         self.bit(self.place(uv))
     }
 
-    /// Whether all that lies within `bounds`, which are inside the picture, belongs to a chart.
+    /// Whether all that lies within `bounds`, which are inside the picture, belongs to a chart; so that it takes no longer than what it saves, no
+    /// is said of bounds that are larger than any block of pixels should be.
     #[must_use]
     #[inline(never)]
     pub fn fills(&self, &Bounds { low, high }: &Bounds) -> bool {
+        const MOST: u32 = 8;
         let ([left, top], [right, bottom]) = (self.place(low), self.place(high));
+        if (right >> BLOCK_LOG2).wrapping_sub(left >> BLOCK_LOG2) >= MOST || (bottom >> BLOCK_LOG2).wrapping_sub(top >> BLOCK_LOG2) >= MOST
+        {
+            return false;
+        }
         // The first and the last bit of a row or column that counts, in the block that `at` is in, of bits from `first` to `last`.
         let part = |at: u32, first: u32, last: u32| [first.saturating_sub(at), last.wrapping_sub(at).min(7)];
         let mut y = top & !7;

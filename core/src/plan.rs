@@ -434,7 +434,7 @@ fn lay<const TILES: usize, const USUAL: bool, T: Place>(
         let across = cells.tiles::<TILES>(left, right, bends, margin, |x, log2| window.lane::<false>(x, log2));
         let down = cells.tiles::<TILES>(left_down, right_down, falls, margin, |x, log2| window.lane::<true>(x, log2));
         for (slot, (across, down)) in slots.iter_mut().zip(across.iter().zip(down)) {
-            *slot = down.plus(across).from_middle(3).of(Head::of(head));
+            *slot = down.plus(across).counted_from_first(3).of(Head::of(head));
         }
         (left, left_down) = (right, right_down);
         done = done.wrapping_add(1);

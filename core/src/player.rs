@@ -96,6 +96,11 @@ impl<'a, T: Texels> Player<'a, T> {
         self.playing.set_byte_order(order);
     }
 
+    /// Whether pixels' bytes are in the other order than the machine's.
+    pub(crate) fn swapped(&self) -> bool {
+        self.playing.swapped()
+    }
+
     /// Makes `frame` the current frame; past the end it wraps on a looping bundle, else the last frame stays.
     ///
     /// What the frame needs and is not there is decoded: backwards, or far ahead, from an independent key on. Then the key that comes

@@ -370,7 +370,8 @@ impl<'a> Playing<'a> {
             let share = |frame: u32| frame.saturating_sub(coming.from).saturating_add(coming.lead);
             let (frames, shares) = (share(frame), share(length));
             let due = u64::from(coming.whole).saturating_mul(frames.into()).checked_div(shares.into()).unwrap_or(0) as u32;
-            let left = if frames < shares { Some(coming.whole.saturating_sub(due)) } else { None };
+            // Where no share is left to what the seek before it took, the frames of the next interval do it.
+            let left = if frames < shares || shares == 0 { Some(coming.whole.saturating_sub(due)) } else { None };
             self.decode(&mut coming, left);
         } else {
             coming.from = coming.from.max(frame);

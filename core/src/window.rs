@@ -142,7 +142,7 @@ impl Tile {
     /// One of 2^`log2` pixels that is told down its middle column, counted from the first one instead.
     #[must_use]
     #[inline(always)]
-    pub const fn from_middle(self, log2: u32) -> Self {
+    pub const fn counted_from_first(self, log2: u32) -> Self {
         let Self { down: [upper, lower], at, step, turn, .. } = self;
         let half = 1u32.wrapping_shl(log2) >> 1;
         let turns = half.wrapping_mul(turn);
@@ -233,7 +233,7 @@ impl Window {
         let (u, v) = (Middle::new(u.corners, u.sums), Middle::new(v.corners, v.sums));
         let first = i32::from(row).wrapping_shl(16);
         let v = v.plus(first.wrapping_neg()).lanes(log2, |x, log2| self.lane::<true>(x, log2));
-        v.plus(&u.lanes(log2, |x, log2| self.lane::<false>(x, log2))).from_middle(log2)
+        v.plus(&u.lanes(log2, |x, log2| self.lane::<false>(x, log2))).counted_from_first(log2)
     }
 }
 

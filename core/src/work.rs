@@ -19,7 +19,7 @@ pub struct Work {
     pub torn_pixels: u32,
     /// Coverage tests made for them.
     pub coverage_tests: u32,
-    /// Pixels that [`crate::Player::smooth_row`] made of four.
+    /// Pixels of blocks that [`crate::Player::smooth_row`] or [`crate::Player::fine_row`] sampled four times.
     pub smoothed_pixels: u32,
 }
 

@@ -114,6 +114,14 @@ pub enum Texels {
 }
 
 impl Render {
+    /// Refuses options that do not go together, before anything is loaded or baked.
+    pub fn check(&self) -> Result<(), Usage> {
+        if self.smooth && self.texels == Texels::Dithered {
+            return Err(Usage("--smooth and --texels dithered: there are no such rows; take --texels nearest or bilinear".to_owned()));
+        }
+        Ok(())
+    }
+
     /// How the player draws a row.
     pub fn draw(&self) -> Draw {
         match (self.texels, self.smooth) {

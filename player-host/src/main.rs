@@ -38,7 +38,10 @@ use std::time::Duration;
 fn main() -> ExitCode {
     let cli = Cli::parse();
     let result = clean_up_when_interrupted().and_then(|()| match &cli.command {
-        Some(Command::Render(args)) => with_player(Some(&args.bundle), |_, _, mut player| render::run(&mut player, args)),
+        Some(Command::Render(args)) => {
+            args.check()?;
+            with_player(Some(&args.bundle), |_, _, mut player| render::run(&mut player, args))
+        }
         Some(Command::Measure(args)) => {
             with_player(Some(&args.bundle), |loaded, bundle, mut player| measure::run(loaded, bundle, &mut player, args.json))
         }

@@ -1,7 +1,7 @@
 //! `cubist-player render`: frames as PNG files and as a GIF.
 //! A player comes in; files go out through `files`, so that each is whole or not there.
 
-use crate::cli::{Render, Texels, Usage};
+use crate::cli::{Render, Usage};
 use crate::files::write_png;
 use crate::input;
 use crate::picture::{Draw, Picture, Player};
@@ -40,9 +40,6 @@ pub fn run(player: &mut Player<'_>, args: &Render) -> Result<()> {
         scale: args.scale,
         draw: args.draw(),
     };
-    if args.smooth && args.texels == Texels::Dithered {
-        return Err(Usage("--smooth and --texels dithered: there are no such rows; take --texels nearest or bilinear".to_owned()).into());
-    }
     if let Some(gif) = plan.gif {
         input::keep(&args.bundle, "--gif", gif)?;
     }

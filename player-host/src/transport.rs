@@ -96,7 +96,9 @@ impl Transport {
         self.anchor(now);
         self.reverse = !self.reverse;
         if !self.playing {
-            self.place(self.frame(now), now);
+            let frame = self.frame(now);
+            self.turn_out();
+            self.place(frame, now);
         }
     }
 
@@ -104,9 +106,7 @@ impl Transport {
     pub fn next_ends(&mut self, now: Duration) {
         self.anchor(now);
         let frame = self.frame(now);
-        if self.returning() {
-            self.reverse = !self.reverse;
-        }
+        self.turn_out();
         self.ends = match self.ends {
             Ends::Stop => Ends::Loop,
             Ends::Loop => Ends::PingPong,
@@ -121,18 +121,21 @@ impl Transport {
         self.speed = if faster { (self.speed + 1).min(SPEEDS.len() - 1) } else { self.speed.saturating_sub(1) };
     }
 
-    /// Pauses and moves `by` frames; round the end on a loop, else as far as the end.
+    /// Pauses and moves `by` frames; round the end on a loop, else as far as the end. The direction of travel stays.
     pub fn step(&mut self, by: i32, now: Duration) {
         self.anchor(now);
         self.playing = false;
         let target = i64::from(self.frame(now)) + i64::from(by);
+        self.turn_out();
         let frames = i64::from(self.frames);
         let target = if self.ends == Ends::Loop { target.rem_euclid(frames) } else { target.clamp(0, frames - 1) };
         self.place(u32::try_from(target).unwrap_or(0), now);
     }
 
-    /// Jumps to `frame`, at most the last; playing goes on from there.
+    /// Jumps to `frame`, at most the last; playing goes on from there in the same direction.
     pub fn jump(&mut self, frame: u32, now: Duration) {
+        self.anchor(now);
+        self.turn_out();
         self.place(frame.min(self.frames - 1), now);
     }
 
@@ -207,6 +210,13 @@ impl Transport {
     /// On the way back of a ping-pong, at the anchor.
     fn returning(&self) -> bool {
         self.ends == Ends::PingPong && self.from / FRAME >= i128::from(self.frames)
+    }
+
+    /// Takes the direction of travel on the way back of a ping-pong for that of one on the way out, where a frame is put next.
+    fn turn_out(&mut self) {
+        if self.returning() {
+            self.reverse = !self.reverse;
+        }
     }
 
     fn anchor(&mut self, now: Duration) {
@@ -293,6 +303,27 @@ mod tests {
         transport.next_ends(now);
         assert_eq!((transport.ends(), transport.frame(now), transport.backwards(now)), (Ends::Stop, 2, true));
         assert_eq!(follow(&mut transport, now, 9), [2, 1, 0, 0]);
+    }
+
+    #[test]
+    fn the_way_back_of_a_ping_pong_is_kept_unless_it_is_turned() {
+        let now = Duration::from_millis(450);
+        let on_the_way_back = || Transport::new(4, 10, Ends::PingPong, ZERO);
+        let mut paused = on_the_way_back();
+        paused.toggle_play(now);
+        assert_eq!((paused.frame(now), paused.backwards(now)), (2, true));
+        paused.toggle_reverse(now);
+        assert_eq!((paused.frame(now), paused.backwards(now)), (2, false));
+        paused.toggle_reverse(now);
+        assert_eq!((paused.frame(now), paused.backwards(now)), (2, true));
+        let mut stepped = on_the_way_back();
+        stepped.step(-1, now);
+        assert_eq!((stepped.frame(now), stepped.backwards(now)), (1, true));
+        let mut dragged = on_the_way_back();
+        dragged.grab(now);
+        dragged.jump(2, now);
+        dragged.release(now);
+        assert_eq!((dragged.frame(now), dragged.backwards(now)), (2, true));
     }
 
     #[test]

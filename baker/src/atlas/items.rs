@@ -4,7 +4,7 @@
 use super::mask::Mask;
 use super::search::Search;
 use super::strip::{Shape, Spot};
-use cubist_core::window::Window;
+use cubist_core::Window;
 use rayon::prelude::*;
 use std::cmp::Reverse;
 use std::ops::Range;

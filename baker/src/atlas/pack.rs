@@ -145,7 +145,7 @@ impl Packing<'_> {
             if let Some(wide) = WIDE.into_iter().find(|&wide| gutter > 0 && fits(scale / WORTH, wide)) {
                 (gutter, scale) = (wide, scale / WORTH);
             }
-            let larger = (1..=STEPS).rev().map(|step| (scale * STEP.powi(step)).min(1.0));
+            let larger = (1..=STEPS).rev().map(|step| (scale * libm::pow(STEP, f64::from(step))).min(1.0));
             scale = larger.into_iter().find(|&scale| fits(scale, gutter)).unwrap_or(scale);
         }
         for back in 1..=BACK {
@@ -153,7 +153,7 @@ impl Packing<'_> {
             if let Some((size, spots)) = items.smallest(side, most, gutter) {
                 return Some(self.settled(&items, size, spots, scale, gutter));
             }
-            scale /= STEP.powi(back);
+            scale /= libm::pow(STEP, f64::from(back));
         }
         None
     }
@@ -168,7 +168,7 @@ impl Packing<'_> {
             return None;
         }
         let room = size.map(|side| side - 2 * rim);
-        let scales: Vec<f64> = (0..=if spares { TIMES } else { 0 }).map(|times| FINER.powi(times)).collect();
+        let scales: Vec<f64> = (0..=if spares { TIMES } else { 0 }).map(|times| libm::pow(FINER, f64::from(times))).collect();
         let masks = scales.iter().map(|&scale| self.footprints.drawn(&sizes_within(self.footprints.charting, scale, room), scale));
         let mut masks: Vec<Vec<Mask>> = masks.collect();
         self.footprints.add_seen(&mut masks);

@@ -170,7 +170,7 @@ fn demands(hits: &Hits, charting: &Charting) -> Vec<Option<Box<Demand>>> {
                     }
                     let demand = table[chart as usize].get_or_insert_with(|| Box::new([[[0; BINS]; PIECES]; 2]));
                     for k in 0..2 {
-                        let length = (right.1[k] - here[k]).hypot(below.1[k] - here[k]) * c.density;
+                        let length = libm::hypot(right.1[k] - here[k], below.1[k] - here[k]) * c.density;
                         let piece = ((here[k] - c.lo[k]) / (c.hi[k] - c.lo[k]) * PIECES as f64).clamp(0.0, (PIECES - 1) as f64) as usize;
                         let bin = (0.5 * BINS as f64 - PER_OCTAVE * libm::log2(length.max(f64::MIN_POSITIVE))).clamp(0.0, (BINS - 1) as f64)
                             as usize;

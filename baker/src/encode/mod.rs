@@ -92,6 +92,7 @@ pub fn bundle(content: &Content<'_>, settings: CodingSettings, header: Header<'_
     let planes: Vec<[u8; PLANE_BYTES]> = content.planes.iter().map(Plane::to_bytes).collect();
     let cameras: Vec<[u8; CAMERA_BYTES]> = content.cameras.iter().map(Camera::to_bytes).collect();
     let (table, records) = keys(content, &labels, &planes, settings, &mut bounds);
+    limits::coded(&bounds)?;
     let path = Path {
         width: grid.size[0] as u16,
         height: grid.size[1] as u16,

@@ -126,13 +126,12 @@ fn check_count(e: &ElementDef, header: &Header, length: u64) -> Result<(), Strin
     if e.count > 0 && least == 0 {
         return Err(format!("element {}: {} of them without properties: the header is damaged", e.name, e.count));
     }
+    let needed = (e.count as u64).saturating_mul(least);
     // The last line of an ASCII file need not end.
-    if (e.count as u64).saturating_mul(least) > length + 1 {
+    if needed > length + 1 {
         return Err(format!(
-            "element {}: {} of them need at least {} bytes, but the file has {length}: it is cut short: fetch or export it again",
-            e.name,
-            e.count,
-            e.count as u64 * least
+            "element {}: {} of them need at least {needed} bytes, but the file has {length}: it is cut short: fetch or export it again",
+            e.name, e.count
         ));
     }
     Ok(())

@@ -14,15 +14,20 @@ const MOST: usize = 20_000;
 /// Times that an edge is cut in half, at most.
 const ROUNDS: usize = 16;
 
-/// `scene` with large triangles split; `None` where there are none. Triangles that share an edge are cut at the same point of it.
+/// `scene` with large triangles split; `None` where there are none, or too many. Triangles that share an edge are cut at the same point of it.
 pub(crate) fn split(scene: &Scene) -> Option<Scene> {
     let eyes = Eyes::new(scene);
     let most = scene.triangles.len() + MOST;
     let parts = |triangles: &[Triangle]| -> Option<Vec<Triangle>> {
         let first = triangles.iter().position(|t| eyes.cuts(t) != [false; 3])?;
         let mut out = triangles[..first].to_vec();
-        triangles[first..].iter().for_each(|t| cut(t, eyes.cuts(t), &mut out));
-        Some(out).filter(|out| out.len() <= most)
+        for (t, left) in triangles[first..].iter().zip((0..triangles.len() - first).rev()) {
+            cut(t, eyes.cuts(t), &mut out);
+            if out.len() + left > most {
+                return None;
+            }
+        }
+        Some(out)
     };
     let mut triangles = parts(&scene.triangles)?;
     for _ in 1..ROUNDS {

@@ -211,36 +211,33 @@ fn place_one(p: &Primitive, world: DMat4, skin: Option<&[DMat4]>, model: &mut Mo
         DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y))
     };
     let turn = |n: &Vec3, m: DMat3| (m * n.as_dvec3()).try_normalize().map_or(Vec3::ZERO, |n| n.as_vec3());
-    // A mirror turns what goes around to the left: the front stays in front.
-    let mut mirrored = world.determinant() < 0.0;
-    let (positions, normals): (Vec<DVec3>, Vec<Vec3>) = match skin {
-        None => {
-            let m = cofactors(world);
-            (p.positions.iter().map(|v| world.transform_point3(*v)).collect(), p.normals.iter().map(|n| turn(n, m)).collect())
-        }
-        Some(joints) => {
-            let mut positions = Vec::with_capacity(p.positions.len());
-            let mut normals = Vec::with_capacity(p.normals.len());
-            for (i, v) in p.positions.iter().enumerate() {
-                let m = blend(p, i, joints)?.unwrap_or(world);
-                if i == 0 {
-                    mirrored = m.determinant() < 0.0;
-                }
-                positions.push(m.transform_point3(*v));
-                if let Some(n) = p.normals.get(i) {
-                    normals.push(turn(n, cofactors(m)));
-                }
-            }
-            (positions, normals)
-        }
+    let matrix = |i: usize| Ok::<_, String>(skin.map_or(Ok(None), |joints| blend(p, i, joints))?.unwrap_or(world));
+    let still = cofactors(world);
+    // Where vertex `i` is, and its normal.
+    let vertex = |i: usize| {
+        let m = matrix(i)?;
+        let normal = p.normals.get(i).map(|n| turn(n, if skin.is_some() { cofactors(m) } else { still }));
+        Ok::<_, String>((m.transform_point3(p.positions[i]), normal.unwrap_or(Vec3::ZERO)))
     };
+    if p.corners.is_empty() {
+        return Ok(());
+    }
+    // Each once, unless most are part of no triangle: a small part of a file's vertices may come in many places.
+    let few = 3 * p.corners.len() < p.positions.len();
+    let vertices = if few { Vec::new() } else { (0..p.positions.len()).map(vertex).collect::<Result<Vec<_>, _>>()? };
+    // A mirror turns what goes around to the left: the front stays in front.
+    let mirrored = matrix(0)?.determinant() < 0.0;
     model.coloured |= !p.colours.is_empty();
     for c in &p.corners {
         let [a, b, c] = c.map(|i| i as usize);
         let at = if mirrored { [a, c, b] } else { [a, b, c] };
-        let normal = at.map(|i| normals.get(i).copied().unwrap_or(Vec3::ZERO));
+        let mut placed = [(DVec3::ZERO, Vec3::ZERO); 3];
+        for (placed, &i) in placed.iter_mut().zip(&at) {
+            *placed = if few { vertex(i)? } else { vertices[i] };
+        }
+        let normal = placed.map(|(_, normal)| normal);
         model.triangles.push(Triangle {
-            position: at.map(|i| positions[i]),
+            position: placed.map(|(position, _)| position),
             normal: if normal.contains(&Vec3::ZERO) { [Vec3::ZERO; 3] } else { normal },
             uv: at.map(|i| p.uvs.get(i).copied().unwrap_or(Vec2::ZERO)),
             colour: at.map(|i| p.colours.get(i).copied().unwrap_or(Vec3::ONE)),
