@@ -45,17 +45,25 @@ pub(crate) const BRIEF: u32 = 64;
 pub(crate) struct Other {
     why: &'static str,
     usual: Settings,
+    /// Its mean PSNR beside exact rays, dB.
+    psnr: f64,
     told: String,
 }
 
 impl Other {
     /// What the user should know about `made`.
     pub fn said(&self, made: &Made) -> String {
-        let Self { why, usual: Settings { cell, key_interval, .. }, told } = self;
+        let Self { why, usual: Settings { cell, key_interval, .. }, psnr, told } = self;
+        // Closer keys that are no better beside exact rays were taken for what is seen.
+        let seen = if made.settings.key_interval < *key_interval && made.quality.psnr_mean < *psnr {
+            ", which shows less of the antialiased scene"
+        } else {
+            ""
+        };
         // Either alone keeps both as they are usually.
         let way = if *cell == made.settings.cell { format!("--key-interval {key_interval}") } else { format!("--cell {cell}") };
         format!(
-            "{why}: --cell {} --key-interval {} are used, {}; with {cell} and {key_interval} it would be {told}: give {way} for that",
+            "{why}: --cell {} --key-interval {} are used, {}; with {cell} and {key_interval} it would be {told}{seen}: give {way} for that",
             made.settings.cell,
             made.settings.key_interval,
             made.told(),
@@ -187,7 +195,7 @@ pub(crate) fn choose(
     }
     let Some((_, better)) = better else { return Ok((usual, None)) };
     let why = if why == STEADILY && better.settings.key_interval < usual.settings.key_interval { TURNING } else { why };
-    let other = Other { why, usual: usual.settings, told: usual.told() };
+    let other = Other { why, usual: usual.settings, psnr: usual.quality.psnr_mean, told: usual.told() };
     Ok((better, Some(other)))
 }
 

@@ -4,8 +4,10 @@ use crate::atlas::{self, Storage};
 use crate::bake::{Settings, Sparing};
 use crate::chart::Choice;
 
-/// Screens wider than this get cells of 16 pixels unless told otherwise.
+/// Screens wider than this get cells of 16 pixels unless told otherwise,
 const WIDE: u32 = 640;
+/// and of 32: of smaller ones there are more than a bundle holds.
+const VAST: u32 = 2560;
 /// What the bundle is to reach.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Goal {
@@ -104,7 +106,8 @@ impl Options {
         // The other searches look for what a bit is worth themselves.
         let spares = self.lambda.is_none() && matches!(self.goal, Goal::AsSet | Goal::Ram(_));
         settings.sparing = if spares { Sparing::Unseen } else { Sparing::Nothing };
-        settings.cell = self.cell.unwrap_or(if width > WIDE { 16 } else { settings.cell });
+        let wide = if width > VAST { 32 } else { 16 };
+        settings.cell = self.cell.unwrap_or(if width > WIDE { wide } else { settings.cell });
         settings.key_interval = self.key_interval.unwrap_or(settings.key_interval);
         settings.time = self.time.unwrap_or(settings.time);
         settings.space = self.space.unwrap_or(settings.space);

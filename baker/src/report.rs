@@ -18,6 +18,8 @@ use serde::{Deserialize, Serialize};
 const COARSE: f64 = 0.7;
 /// From this share of pixels on, %, left-out surfaces are worth a warning.
 const DROPPED_PERCENT: f64 = 0.01;
+/// Of the pixels that show the scene, percent, from which on the warning says that most likely something else was meant.
+const LOST_PERCENT: f64 = 25.0;
 
 /// Seconds by stage, wall clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -313,8 +315,17 @@ fn warnings(origin: &Origin<'_>) -> Vec<String> {
     let Origin { scene, flat, encoded, settings, .. } = origin;
     let figures = &flat.atlas.figures;
     let mut out = Vec::new();
-    let dropped = 100.0 * encoded.dropped_pixels as f64 / flat.rays.max(1) as f64;
-    if dropped > DROPPED_PERCENT {
+    let share = |of: u64| 100.0 * encoded.dropped_pixels as f64 / of.max(1) as f64;
+    let dropped = share(flat.rays);
+    // Of those that show more than the backdrop.
+    let lost = share(flat.atlas.gbuffer.label.iter().filter(|&&label| label != 0).count() as u64);
+    if lost > LOST_PERCENT {
+        out.push(format!(
+            "{lost:.0} % of what the camera sees of the scene is lost: its surfaces are too small on the screen for cells of {0} x {0} pixels; bring the camera \
+             nearer, raise --size, or try --cell 4 --key-interval 1 --sheets all",
+            settings.cell
+        ));
+    } else if dropped > DROPPED_PERCENT {
         let cure = finer(settings.cell, settings.key_interval);
         let (what, cure) = match settings.error > 0.0 {
             true => (", or that shows less there than it takes", format!("--sheets all keeps more, {cure}")),

@@ -16,6 +16,8 @@ pub const DEMO: &str = "street";
 pub enum Scene<'a> {
     /// [`DEMO`].
     Demo,
+    /// A built-in scene, by name.
+    Builtin(&'a str),
     /// A scene file or a model.
     File(&'a Path),
 }
@@ -35,6 +37,7 @@ pub fn bake(scene: Scene<'_>, progress: &(dyn Fn(&str, f32) + Sync)) -> Result<B
     progress("reading the scene", 0.0);
     let (scene, name, options) = match scene {
         Scene::Demo => (scene::load_builtin(DEMO, &Overrides::default())?, DEMO.to_owned(), settled()),
+        Scene::Builtin(name) => (scene::load_builtin(name, &Overrides::default())?, name.to_owned(), Options::default()),
         Scene::File(path) => (scene::load(path, &Overrides::default())?, path.display().to_string(), Options::default()),
     };
     // Someone waits for the picture: the antialiased truth is for `cubist-bake --report`.

@@ -36,7 +36,7 @@ H in the window lists the keys.";
 /// What `cubist-player [BUNDLE | SCENE]` takes.
 #[derive(Args, Debug)]
 pub struct Show {
-    /// A bundle, or a scene to bake first; left out: the built-in demo.
+    /// A bundle, or a scene (builtin:NAME too) to bake first; left out: the built-in demo.
     #[arg(value_name = "BUNDLE | SCENE")]
     pub input: Option<PathBuf>,
     /// Opens no window: writes frame-0000.png ... and demo.gif into --out, or one picture with --shot.

@@ -23,12 +23,15 @@ pub struct Loaded {
     pub rows: Vec<(String, String)>,
 }
 
-/// Reads a bundle, or bakes a scene (told by its ending), or bakes the demo when `path` is none.
+/// Reads a bundle, or bakes a scene (told by its ending, or built in: `builtin:NAME`), or bakes the demo when `path` is none.
 pub fn load(path: Option<&Path>) -> Result<Loaded> {
     let Some(path) = path else {
         return baked(DEMO.to_owned(), Scene::Demo);
     };
     let name = path.display().to_string();
+    if let Some(scene) = name.strip_prefix("builtin:") {
+        return baked(name.clone(), Scene::Builtin(scene));
+    }
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
     if ending.is_some_and(|e| SCENES.contains(&e.as_str())) {
         return baked(name, Scene::File(path));

@@ -38,8 +38,8 @@ pub(super) fn read(name: &Path, folder: &Path, trouble: &mut Trouble) -> tobj::M
 
 /// Appends the lines of `text` that are shown to `lines`; anything else in it may be as odd as it likes.
 fn clean(text: &str, library: &str, lines: &mut String, told: &mut Vec<String>) {
-    for (number, line) in text.lines().enumerate() {
-        let line = line.trim();
+    for (number, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
+        let line = without_comment(line);
         let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         let rest = rest.trim();
         let place = || format!("{library}: line {}: \"{line}\"", number + 1);
@@ -74,6 +74,20 @@ fn clean(text: &str, library: &str, lines: &mut String, told: &mut Vec<String>) 
             Err(expected) => told.push(format!("{}: expected {expected}: left out", place())),
         }
     }
+}
+
+/// A line without the comment at its end: from a `#` on that follows a blank and is no number's, as in 3ds Max's names ("Material #25").
+fn without_comment(line: &str) -> &str {
+    let starts = |&(at, _): &(usize, &str)| {
+        let after = line[at + 1..].chars().next();
+        line[..at].chars().next_back().is_none_or(char::is_whitespace) && !after.is_some_and(|c| c.is_ascii_digit())
+    };
+    line.match_indices('#').find(starts).map_or(line, |(at, _)| &line[..at]).trim()
+}
+
+/// The name that a line has after its first word.
+pub(super) fn name(line: &str) -> &str {
+    without_comment(line).split_once(char::is_whitespace).map_or("", |(_, name)| name.trim())
 }
 
 /// Whether a map statement's options move, scale or cut the picture, or change its colours.

@@ -19,12 +19,14 @@ pub(crate) fn load(path: &Path, texture: Option<&Path>) -> Result<Model, SceneEr
     }
     // Names in other encodings are common; the numbers are ASCII whatever the encoding.
     let text = String::from_utf8_lossy(&bytes);
-    model(&text, path.parent().unwrap_or(Path::new("")), texture).map_err(error)
+    // Lines that end as those of old Macintoshes.
+    let text = if text.contains('\n') { text } else { text.replace('\r', "\n").into() };
+    model(text.trim_start_matches('\u{feff}'), path.parent().unwrap_or(Path::new("")), texture).map_err(error)
 }
 
 fn model(text: &str, folder: &Path, fallback: Option<&Path>) -> Result<Model, String> {
     let mut model = Model::default();
-    let clean = check(text, &mut model.warnings)?;
+    let (clean, origin) = check(text, &mut model.warnings)?;
     let trouble = RefCell::new(Trouble::default());
     let options = tobj::LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, single_index: false };
     let library = |name: &Path| mtl::read(name, folder, &mut trouble.borrow_mut());
@@ -55,16 +57,21 @@ fn model(text: &str, folder: &Path, fallback: Option<&Path>) -> Result<Model, St
     }
     model.textures = textures.all;
     if !model.textures.is_empty() && objects.iter().all(|o| o.mesh.texcoords.len() <= 2) {
-        model.warnings.add("there are textures but no texture coordinates: they show their first texel only");
+        model.warnings.add("there are textures but no texture coordinates: each shows the colour of its corner only");
     }
     for object in &objects {
-        append(&object.mesh, plain, &mut model);
+        append(&object.mesh, origin, plain, &mut model);
     }
     Ok(model)
 }
 
-/// Checks every line that matters and hands back a text that `tobj` takes as it is meant: lines joined, extras dropped.
-fn check(text: &str, warnings: &mut Warnings) -> Result<String, String> {
+/// Vertices farther from the origin than this are told from the first one: `tobj` holds them in 24 bits.
+const FAR: f64 = 4096.0;
+
+/// Checks every line that matters and hands back a text that `tobj` takes as it is meant: lines joined, extras dropped; and where its vertices are
+/// counted from.
+fn check(text: &str, warnings: &mut Warnings) -> Result<(String, DVec3), String> {
+    let (mut libraries, mut origin) = (String::new(), DVec3::ZERO);
     let mut clean = String::with_capacity(text.len());
     // Number 1 of each stands for "none": left to itself, `tobj` gives such corners the ones of the corner before.
     clean.push_str("vt 0 1\nvn 0 0 0\n");
@@ -76,14 +83,17 @@ fn check(text: &str, warnings: &mut Warnings) -> Result<String, String> {
     while let Some((number, line)) = lines.next() {
         let place = number + 1;
         let mut line = line.to_owned();
-        while line.ends_with('\\') {
+        // A comment goes no further than its line.
+        while line.ends_with('\\') && !line.contains('#') {
             line.pop();
             line.push(' ');
             line.push_str(lines.next().map_or("", |l| l.1));
         }
-        let line = line.split('#').next().unwrap_or("").trim();
+        let whole = line.trim();
+        let line = whole.split('#').next().unwrap_or("").trim();
         let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
-        let numbers = || rest.split_whitespace().map(|w| w.parse::<f32>().ok().filter(|v| v.is_finite())).collect::<Option<Vec<f32>>>();
+        let number = |word: &str| word.parse::<f64>().ok().filter(|v| (*v as f32).is_finite());
+        let numbers = || rest.split_whitespace().map(number).collect::<Option<Vec<f64>>>();
         match word {
             "v" | "vt" | "vn" => {
                 let least = if word == "vt" { 1 } else { 3 };
@@ -93,9 +103,14 @@ fn check(text: &str, warnings: &mut Warnings) -> Result<String, String> {
                 match word {
                     "v" => {
                         vertices += 1;
-                        positions.push(Vec3::from_slice(&v[..3]).as_dvec3());
+                        let at = DVec3::from_slice(&v[..3]);
+                        if vertices == 1 && at.abs().max_element() > FAR {
+                            origin = at.round();
+                        }
+                        let from = (at - origin).as_vec3();
+                        positions.push(from.as_dvec3());
                         coloured += i64::from(v.len() >= 6);
-                        clean.push_str(&format!("v {} {} {}", v[0], v[1], v[2]));
+                        clean.push_str(&format!("v {} {} {}", from.x, from.y, from.z));
                         if let [_, _, _, r, g, b, ..] = v[..] {
                             clean.push_str(&format!(" {r} {g} {b}"));
                         }
@@ -150,7 +165,12 @@ fn check(text: &str, warnings: &mut Warnings) -> Result<String, String> {
                 warnings.add("points and lines are not shown: only faces are");
                 continue;
             }
-            "mtllib" | "usemtl" | "o" | "g" if !rest.trim().is_empty() => clean.push_str(&format!("{word} {}", rest.trim())),
+            // Wherever it stands, it is about all of the file.
+            "mtllib" => {
+                libraries.push_str(&format!("mtllib {}\n", mtl::name(whole)));
+                continue;
+            }
+            "usemtl" | "o" | "g" if !mtl::name(whole).is_empty() => clean.push_str(&format!("{word} {}", mtl::name(whole))),
             "o" | "g" => clean.push_str(word),
             "curv" | "curv2" | "surf" => {
                 warnings.add("free-form curves and surfaces are not shown: export polygons");
@@ -169,7 +189,7 @@ fn check(text: &str, warnings: &mut Warnings) -> Result<String, String> {
     if triangles > MAX_TRIANGLES {
         return Err(too_many(triangles));
     }
-    let mut clean = cut(&clean, &positions);
+    let mut clean = libraries + &cut(&clean, &positions);
     if coloured > 0 && coloured < vertices {
         warnings.add(format!("only {coloured} of {vertices} vertices have colours: they are ignored"));
         clean = clean
@@ -180,7 +200,7 @@ fn check(text: &str, warnings: &mut Warnings) -> Result<String, String> {
             })
             .collect();
     }
-    Ok(clean)
+    Ok((clean, origin))
 }
 
 /// The same text with polygons that are no fans cut into triangles: `tobj` makes fans of all.
@@ -281,7 +301,8 @@ fn look(m: &tobj::Material, folder: &Path, textures: &mut Shelf, warnings: &mut 
     Ok(out)
 }
 
-fn append(mesh: &tobj::Mesh, plain: usize, model: &mut Model) {
+/// Appends the triangles of `mesh`, whose positions are counted from `origin`; `plain` is the material of faces without one.
+fn append(mesh: &tobj::Mesh, origin: DVec3, plain: usize, model: &mut Model) {
     let vec3 = |from: &[f32], i: u32| from.get(3 * i as usize..3 * i as usize + 3).map(Vec3::from_slice);
     let uv = |i: u32| mesh.texcoords.get(2 * i as usize..2 * i as usize + 2).map(|t| Vec2::new(t[0], 1.0 - t[1]));
     model.coloured |= !mesh.vertex_color.is_empty();
@@ -290,7 +311,7 @@ fn append(mesh: &tobj::Mesh, plain: usize, model: &mut Model) {
         let normal = [0, 1, 2]
             .map(|k| of(&mesh.normal_indices, k).and_then(|i| vec3(&mesh.normals, i)).and_then(Vec3::try_normalize).unwrap_or(Vec3::ZERO));
         model.triangles.push(Triangle {
-            position: corners.map(|i| vec3(&mesh.positions, i).map_or(DVec3::ZERO, Vec3::as_dvec3)),
+            position: corners.map(|i| origin + vec3(&mesh.positions, i).map_or(DVec3::ZERO, Vec3::as_dvec3)),
             normal: if normal.contains(&Vec3::ZERO) { [Vec3::ZERO; 3] } else { normal },
             uv: [0, 1, 2].map(|k| of(&mesh.texcoord_indices, k).and_then(uv).unwrap_or(Vec2::ZERO)),
             colour: corners.map(|i| vec3(&mesh.vertex_color, i).map_or(Vec3::ONE, |c| c.clamp(Vec3::ZERO, Vec3::ONE))),
@@ -306,7 +327,7 @@ mod tests {
 
     #[test]
     fn faults_name_their_line() {
-        let check = |t: &str| check(t, &mut Warnings::default());
+        let check = |t: &str| check(t, &mut Warnings::default()).map(|(text, _)| text);
         assert_eq!(check("v 0 0 0\nv 1 0 0\nf 1 2 9\n").unwrap_err(), "line 3: index 9 of 2 vertices");
         assert!(check("v 0 0 0\nf 1 1 6148914691236517205\n").unwrap_err().starts_with("line 2: index"));
         assert!(check("v 0 0 0\nf 1/x 1 1\n").unwrap_err().starts_with("line 2: \"1/x\""));
@@ -319,9 +340,25 @@ mod tests {
     #[test]
     fn faces_of_two_corners_are_left_out() {
         let mut warnings = Warnings::default();
-        let text = check("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\nf 1 2 3\n", &mut warnings).unwrap();
+        let (text, _) = check("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2\nf 1 2 3\n", &mut warnings).unwrap();
         assert!(!text.contains("f 1/1/1 2/1/1\n") && text.ends_with("f 1/1/1 2/1/1 3/1/1\n"), "{text}");
         assert_eq!(warnings.into_vec(), ["faces of two corners are not shown"]);
+    }
+
+    #[test]
+    fn comments_names_and_libraries_are_told_apart() {
+        let text = "# from C:\\models\\\nusemtl Material #25\nv 0 0 0 # one\nmtllib a#b.mtl # two\nusemtl wall #three\n";
+        let (text, _) = check(text, &mut Warnings::default()).unwrap();
+        assert_eq!(text, "mtllib a#b.mtl\nvt 0 1\nvn 0 0 0\nusemtl Material #25\nv 0 0 0\nusemtl wall\n");
+    }
+
+    #[test]
+    fn vertices_far_from_the_origin_keep_their_places() {
+        let far = |[x, y]: [f64; 2]| format!("v {} {} 7\n", 392_000.25 + x, -5_820_000.75 + y);
+        let corners = [[0.0, 0.0], [0.125, 0.0], [0.0, 0.0625]];
+        let text = corners.map(far).concat() + "f 1 2 3\n";
+        let placed = model(&text, Path::new(""), None).unwrap().triangles[0].position;
+        assert_eq!(placed, corners.map(|[x, y]| DVec3::new(392_000.25 + x, -5_820_000.75 + y, 7.0)));
     }
 
     #[test]

@@ -135,7 +135,8 @@ fn read(
                 (0..count).map(map).collect()
             }
             None => {
-                warnings.add(format!("{place}: has a texture but no TEXCOORD_{}: it shows the texture's first texel", mapping.set));
+                warnings
+                    .add(format!("{place}: has a texture but no TEXCOORD_{}: it shows the colour of the texture's corner", mapping.set));
                 Vec::new()
             }
         },
