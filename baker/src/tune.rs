@@ -179,10 +179,11 @@ impl Search<'_> {
             self.say(step, steps);
             let source = atlas::Settings { density: asked.density * scale * ratio, detail, ..asked };
             let coarsest = ratio == DENSITIES[DENSITIES.len() - 1];
+            let finer = |last: &Image| source.density / last.source.density;
             if let Some(last) = images.last()
                 && last.source.detail == detail
                 && !coarsest
-                && last.least() as f64 * (source.density / last.source.density).powi(2) > 1.5 * room as f64
+                && last.least() as f64 * finer(last) * finer(last) > 1.5 * room as f64
             {
                 continue;
             }

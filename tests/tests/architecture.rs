@@ -157,6 +157,40 @@ fn the_core_has_no_floats() {
     none(found);
 }
 
+/// What the system's library, the compiler or the processor may round otherwise elsewhere.
+const ROUNDED: [&str; 18] = [
+    ".hypot(",
+    ".powi(",
+    ".powf(",
+    ".sin()",
+    ".cos()",
+    ".sin_cos()",
+    ".tan()",
+    ".asin()",
+    ".acos()",
+    ".atan()",
+    ".atan2(",
+    ".exp()",
+    ".exp2()",
+    ".ln()",
+    ".log2()",
+    ".log10()",
+    ".cbrt()",
+    ".mul_add(",
+];
+
+#[test]
+fn the_baker_computes_the_same_everywhere() {
+    let mut found = Vec::new();
+    for source in source::below("baker/src/") {
+        let code = source.code_without_tests();
+        for call in ROUNDED {
+            found.extend(code.match_indices(call).map(|(at, _)| format!("{}:{}: {call}", source.path, source::line(&code, at))));
+        }
+    }
+    none(found);
+}
+
 #[test]
 fn the_core_imports_downwards() {
     let sources = source::below("core/src/");
