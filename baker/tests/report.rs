@@ -157,6 +157,23 @@ fn surfaces_that_are_left_out_are_wrong_and_warned_of() {
 }
 
 #[test]
+fn a_backdrop_takes_no_room_of_positions() {
+    // What stands above the ground, on a screen of more nodes than a key can hold positions.
+    let mut scene = small("pyramid");
+    scene.background = Background::Colour([9, 8, 7]);
+    scene.triangles.retain(|triangle| triangle.position.iter().any(|p| p.y > 0.1));
+    (scene.playback.width, scene.playback.height, scene.playback.frames) = (1040, 1040, 1);
+    let settings = cubist_baker::bake::Settings { cell: 4, ..Default::default() };
+    let flat = cubist_baker::bake::flatten(&scene, &settings.atlas, &|_, _| {}).unwrap();
+    let encoded = cubist_baker::bake::encode(&scene, &flat, &settings, &|_, _| {}).unwrap();
+    let bundle = cubist_core::Bundle::parse(&encoded.bundle).unwrap();
+    let nodes = encoded.grid.grid.nodes();
+    assert!(nodes > 65_535 && usize::from(bundle.limits().key_layers) < nodes, "{nodes} {:?}", bundle.limits());
+    let quality = verify::against_exact(&encoded.bundle, &flat.atlas, &|_, _| {}).unwrap();
+    assert!(quality.wrong_surface_percent < 0.1, "{quality:?}");
+}
+
+#[test]
 fn the_truth_can_be_left_out() {
     let options = Options { truth: TruthFrames::None, ..Options::default() };
     let (_, report) = bake_scene(&small("pyramid"), &options, &|_, _| {}).unwrap();

@@ -135,6 +135,14 @@ fn ply_ascii_and_binary_agree() {
 }
 
 #[test]
+fn colours_of_ply_faces_are_told() {
+    let head = "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nproperty uchar red\n";
+    let text = format!("ply\nformat ascii 1.0\n{head}end_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2 255\n");
+    let scene = with(&[("a.ply", text.as_bytes())], "a.ply").unwrap();
+    assert!(scene.warnings.iter().any(|w| w.starts_with("the colours of faces")), "{:?}", scene.warnings);
+}
+
+#[test]
 fn ply_faults_are_errors() {
     let ascii = |head: &str, body: &str| format!("ply\nformat ascii 1.0\n{head}end_header\n{body}").into_bytes();
     let xyz = "property float x\nproperty float y\nproperty float z\n";

@@ -338,7 +338,7 @@ fn check_planes<'a>(path: &Path<'a>, keys: usize) -> Result<Records<'a>, BundleE
     let wanted = if planes.is_empty() { 0 } else { keys };
     length(wanted.saturating_mul(CAMERA_BYTES), path.cameras.len(), "PATH cameras")?;
     let labels = planes.iter().map(|[label, ..]| *label);
-    let unordered = labels.clone().zip(labels.skip(1)).find(|(label, next)| label >= next);
-    field(unordered.is_none(), "PATH planes", unordered.map_or(0, |(_, next)| next.into()))?;
+    let ascending = labels.clone().zip(labels.skip(1)).all(|(label, next)| label < next);
+    field(ascending, "PATH planes", planes.len() as u32)?;
     Ok((planes, cameras))
 }

@@ -120,6 +120,15 @@ mod tests {
     use super::*;
 
     #[test]
+    fn what_is_larger_than_blocks_should_be_is_not_looked_through() {
+        let shape = Shape { width_log2: 10, height: 1024, finer: 2 };
+        let tiles = [Tile::default(); 512 * 512];
+        let mask = Mask { tiles: &tiles, blocks: &[[0xff; 8]], shape };
+        let fills = |side: i32| mask.fills(&Bounds { low: PlayUv { u: 0, v: 0 }, high: PlayUv { u: side << 16, v: 5 << 16 } });
+        assert_eq!([15, 16, 1023].map(fills), [true, false, false]);
+    }
+
+    #[test]
     fn what_is_covered_and_filled_is_what_bits_say() {
         let mut seed = 3u32;
         let mut next = |below: u32| {

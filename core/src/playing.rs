@@ -370,7 +370,7 @@ impl<'a> Playing<'a> {
             let share = |frame: u32| frame.saturating_sub(coming.from).saturating_add(coming.lead);
             let (frames, shares) = (share(frame), share(length));
             let due = u64::from(coming.whole).saturating_mul(frames.into()).checked_div(shares.into()).unwrap_or(0) as u32;
-            // Where no share is left to what the seek before it took, the frames of the next interval do it.
+            // No share is left on the last frame of an interval if the seek to it decoded all it may: the frames after it do the rest.
             let left = if frames < shares || shares == 0 { Some(coming.whole.saturating_sub(due)) } else { None };
             self.decode(&mut coming, left);
         } else {

@@ -140,6 +140,22 @@ fn a_frame_that_is_shown_again_decodes_nothing() {
 }
 
 #[test]
+fn a_frame_that_was_jumped_to_and_is_shown_again_decodes_nothing() {
+    for time in [TIME_CUBIC, TIME_LINEAR, TIME_HOLD] {
+        let bytes = bake_even("street", [64, 48], 43, false, time, 4);
+        let bundle = Bundle::parse(&bytes).expect("the baker's bytes parse");
+        let mut memory = vec![0; bundle.memory_needed()];
+        for frame in 0..43 {
+            let mut player = Player::new(&bundle, &mut memory).expect("the memory it asked for");
+            for shown in 0..3 {
+                player.seek(Frame(frame));
+                assert!(shown == 0 || player.work() == Work::default(), "frame {frame}: {:?}", player.work());
+            }
+        }
+    }
+}
+
+#[test]
 fn no_seek_decodes_more_keys_than_the_bundle_says() {
     for looping in [false, true] {
         let frames = if looping { 60 } else { 61 };

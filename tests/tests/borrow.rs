@@ -155,6 +155,20 @@ fn a_short_row_buffer_draws_what_it_holds() {
 }
 
 #[test]
+fn an_image_has_its_colours_in_any_byte_order() {
+    play::visit(bytes(), [6], |_, player| {
+        let rows = play::pixels(player);
+        for order in [ByteOrder::BigEndian, ByteOrder::LittleEndian, ByteOrder::Native] {
+            player.set_byte_order(order);
+            let mut display = Display::new(80, 60);
+            Image::new(&player.image(&mut [0; SIZE[0] as usize]), Point::zero()).draw(&mut display).expect("drawing cannot fail");
+            assert!((0..SIZE[1]).all(|y| (0..SIZE[0]).all(|x| display.at(x, y) == colour(&rows, x, y))), "{order:?}");
+        }
+    })
+    .expect("the baker's bytes play");
+}
+
+#[test]
 fn byte_orders_are_what_embedded_graphics_calls_them() {
     play::visit(bytes(), [6], |_, player| {
         let native: Vec<Rgb565> = play::pixels(player).into_iter().map(|raw| Rgb565::from(RawU16::new(raw))).collect();

@@ -166,7 +166,7 @@ fn check(text: &str, warnings: &mut Warnings) -> Result<(String, DVec3), String>
                 continue;
             }
             // Wherever it stands, it is about all of the file.
-            "mtllib" => {
+            "mtllib" if !mtl::name(whole).is_empty() => {
                 libraries.push_str(&format!("mtllib {}\n", mtl::name(whole)));
                 continue;
             }

@@ -168,8 +168,14 @@ fn model(bytes: &[u8], folder: &Path, fallback: Option<&Path>) -> Result<Model, 
             vertices.len()
         ));
     }
-    let has = |names: &[&str]| header.elements.get("vertex").is_some_and(|e| names.iter().any(|n| e.properties.contains_key(*n)));
-    model.coloured = has(&["red", "r", "diffuse_red"]);
+    let has_of =
+        |element: &str, names: &[&str]| header.elements.get(element).is_some_and(|e| names.iter().any(|n| e.properties.contains_key(*n)));
+    let has = |names: &[&str]| has_of("vertex", names);
+    const RED: [&str; 3] = ["red", "r", "diffuse_red"];
+    model.coloured = has(&RED);
+    if has_of("face", &RED) {
+        model.warnings.add("the colours of faces are not shown: only those of vertices are");
+    }
     let texture = header.comments.iter().find_map(|c| c.trim().strip_prefix("TextureFile")).map(|n| beside(n.trim(), folder));
     let texture = texture.or_else(|| fallback.map(Path::to_owned));
     let mut material = Material::default();
