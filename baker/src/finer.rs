@@ -44,29 +44,28 @@ pub(crate) const BRIEF: u32 = 64;
 /// Why a bundle is of other cells or intervals than usual, and what the usual one was.
 pub(crate) struct Other {
     why: &'static str,
-    usual: Settings,
-    /// Its mean PSNR beside exact rays, dB.
-    psnr: f64,
-    told: String,
+    usual: Made,
 }
 
 impl Other {
     /// What the user should know about `made`.
     pub fn said(&self, made: &Made) -> String {
-        let Self { why, usual: Settings { cell, key_interval, .. }, psnr, told } = self;
+        let Self { why, usual } = self;
+        let Settings { cell, key_interval, .. } = usual.settings;
         // Closer keys that are no better beside exact rays were taken for what is seen.
-        let seen = if made.settings.key_interval < *key_interval && made.quality.psnr_mean < *psnr {
+        let seen = if made.settings.key_interval < key_interval && made.quality.psnr_mean < usual.quality.psnr_mean {
             ", which shows less of the antialiased scene"
         } else {
             ""
         };
         // Either alone keeps both as they are usually.
-        let way = if *cell == made.settings.cell { format!("--key-interval {key_interval}") } else { format!("--cell {cell}") };
+        let way = if cell == made.settings.cell { format!("--key-interval {key_interval}") } else { format!("--cell {cell}") };
         format!(
-            "{why}: --cell {} --key-interval {} are used, {}; with {cell} and {key_interval} it would be {told}{seen}: give {way} for that",
+            "{why}: --cell {} --key-interval {} are used, {}; with {cell} and {key_interval} it would be {}{seen}: give {way} for that",
             made.settings.cell,
             made.settings.key_interval,
             made.told(),
+            usual.told(),
         )
     }
 }
@@ -195,8 +194,7 @@ pub(crate) fn choose(
     }
     let Some((_, better)) = better else { return Ok((usual, None)) };
     let why = if why == STEADILY && better.settings.key_interval < usual.settings.key_interval { TURNING } else { why };
-    let other = Other { why, usual: usual.settings, psnr: usual.quality.psnr_mean, told: usual.told() };
-    Ok((better, Some(other)))
+    Ok((better, Some(Other { why, usual })))
 }
 
 #[cfg(test)]

@@ -96,23 +96,19 @@ impl Transport {
         self.anchor(now);
         self.reverse = !self.reverse;
         if !self.playing {
-            let frame = self.frame(now);
-            self.turn_out();
-            self.place(frame, now);
+            self.place(self.frame(now), now);
         }
     }
 
     /// Goes from stop to loop to ping-pong and round again, keeping the frame and the direction of travel.
     pub fn next_ends(&mut self, now: Duration) {
         self.anchor(now);
-        let frame = self.frame(now);
-        self.turn_out();
+        self.place(self.frame(now), now);
         self.ends = match self.ends {
             Ends::Stop => Ends::Loop,
             Ends::Loop => Ends::PingPong,
             Ends::PingPong => Ends::Stop,
         };
-        self.place(frame, now);
     }
 
     /// One speed up or down the list, as far as it goes.
@@ -126,7 +122,6 @@ impl Transport {
         self.anchor(now);
         self.playing = false;
         let target = i64::from(self.frame(now)) + i64::from(by);
-        self.turn_out();
         let frames = i64::from(self.frames);
         let target = if self.ends == Ends::Loop { target.rem_euclid(frames) } else { target.clamp(0, frames - 1) };
         self.place(u32::try_from(target).unwrap_or(0), now);
@@ -135,7 +130,6 @@ impl Transport {
     /// Jumps to `frame`, at most the last; playing goes on from there in the same direction.
     pub fn jump(&mut self, frame: u32, now: Duration) {
         self.anchor(now);
-        self.turn_out();
         self.place(frame.min(self.frames - 1), now);
     }
 
@@ -212,20 +206,17 @@ impl Transport {
         self.ends == Ends::PingPong && self.from / FRAME >= i128::from(self.frames)
     }
 
-    /// Takes the direction of travel on the way back of a ping-pong for that of one on the way out, where a frame is put next.
-    fn turn_out(&mut self) {
-        if self.returning() {
-            self.reverse = !self.reverse;
-        }
-    }
-
     fn anchor(&mut self, now: Duration) {
         self.from = self.phase(now);
         self.since = now;
     }
 
-    /// Puts `frame` at its beginning, seen in the direction of travel, so that it shows for its whole time.
+    /// Puts `frame` at its beginning, seen in the direction of travel, which stays, so that it shows for its whole time. The anchor is where it comes from.
     fn place(&mut self, frame: u32, now: Duration) {
+        // It is put on the way out, where the way back is the other direction.
+        if self.returning() {
+            self.reverse = !self.reverse;
+        }
         let start = i128::from(frame) * FRAME;
         self.from = if self.reverse { start + FRAME - 1 } else { start };
         self.since = now;

@@ -22,7 +22,7 @@ pub(super) fn read(name: &Path, folder: &Path, trouble: &mut Trouble) -> tobj::M
         let path = beside(name, folder);
         let library = format!("material library {}", path.display());
         match read_file(&path) {
-            Ok(bytes) => clean(&String::from_utf8_lossy(&bytes), &library, &mut lines, &mut trouble.told),
+            Ok(bytes) => clean(&text(&bytes), &library, &mut lines, &mut trouble.told),
             Err(e) => {
                 trouble.told.push(format!("{library}: {e}: its materials are left white"));
                 trouble.lost = true;
@@ -36,9 +36,17 @@ pub(super) fn read(name: &Path, folder: &Path, trouble: &mut Trouble) -> tobj::M
     })
 }
 
+/// The text of an OBJ file or of a library, without a mark at its start. Names in other encodings are common; the numbers are ASCII whatever the encoding.
+pub(super) fn text(bytes: &[u8]) -> String {
+    let text = String::from_utf8_lossy(bytes);
+    let text = text.trim_start_matches('\u{feff}');
+    // Lines may end as those of old Macintoshes.
+    if text.contains('\n') { text.to_owned() } else { text.replace('\r', "\n") }
+}
+
 /// Appends the lines of `text` that are shown to `lines`; anything else in it may be as odd as it likes.
 fn clean(text: &str, library: &str, lines: &mut String, told: &mut Vec<String>) {
-    for (number, line) in text.trim_start_matches('\u{feff}').lines().enumerate() {
+    for (number, line) in text.lines().enumerate() {
         let line = without_comment(line);
         let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
         let rest = rest.trim();

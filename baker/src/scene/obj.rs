@@ -17,11 +17,7 @@ pub(crate) fn load(path: &Path, texture: Option<&Path>) -> Result<Model, SceneEr
     if bytes.starts_with(b"\xfe\xff") || bytes.starts_with(b"\xff\xfe") {
         return Err(error("text in UTF-16; expected UTF-8: save it as that".to_owned()));
     }
-    // Names in other encodings are common; the numbers are ASCII whatever the encoding.
-    let text = String::from_utf8_lossy(&bytes);
-    // Lines that end as those of old Macintoshes.
-    let text = if text.contains('\n') { text } else { text.replace('\r', "\n").into() };
-    model(text.trim_start_matches('\u{feff}'), path.parent().unwrap_or(Path::new("")), texture).map_err(error)
+    model(&mtl::text(&bytes), path.parent().unwrap_or(Path::new("")), texture).map_err(error)
 }
 
 fn model(text: &str, folder: &Path, fallback: Option<&Path>) -> Result<Model, String> {
@@ -165,13 +161,16 @@ fn check(text: &str, warnings: &mut Warnings) -> Result<(String, DVec3), String>
                 warnings.add("points and lines are not shown: only faces are");
                 continue;
             }
-            // Wherever it stands, it is about all of the file.
-            "mtllib" if !mtl::name(whole).is_empty() => {
-                libraries.push_str(&format!("mtllib {}\n", mtl::name(whole)));
-                continue;
-            }
-            "usemtl" | "o" | "g" if !mtl::name(whole).is_empty() => clean.push_str(&format!("{word} {}", mtl::name(whole))),
-            "o" | "g" => clean.push_str(word),
+            "mtllib" | "usemtl" | "o" | "g" => match (word, mtl::name(whole)) {
+                ("mtllib" | "usemtl", "") => continue,
+                // Wherever it stands, it is about all of the file.
+                ("mtllib", name) => {
+                    libraries.push_str(&format!("mtllib {name}\n"));
+                    continue;
+                }
+                (_, "") => clean.push_str(word),
+                (_, name) => clean.push_str(&format!("{word} {name}")),
+            },
             "curv" | "curv2" | "surf" => {
                 warnings.add("free-form curves and surfaces are not shown: export polygons");
                 continue;
