@@ -65,7 +65,7 @@ pub struct Bake {
     pub playback: Playback,
     /// Side of a cell of the key-ray grid, pixels: 4, 8, 16 or 32 [default: 8; 16 on screens over 640 wide, 32 over 2560].
     ///
-    /// Smaller cells follow outlines better and take more bytes and memory. Cells of 16 are what small memories want first: half of it or so, up to
+    /// Smaller cells follow outlines better and take more bytes and memory. Cells of 16 are what small memories want first: half of it or so, about
     /// half fewer bytes of keys, and up to an eighth fewer instructions. Scenes of large flat faces show hardly a difference on a display then, models
     /// lose .5 to 3.5 dB.
     ///

@@ -143,6 +143,8 @@ fn what_is_wrong_is_said_with_place_and_cure() {
         (vec![text("b.obj", "v 1e300 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")], &["b.obj"], vec!["b.obj"]),
         (vec![text("b.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n")], &["b.obj"], vec!["b.obj: line 4", "index 4 of 3"]),
         (vec![text("b.obj", "")], &["b.obj"], vec!["b.obj", "no triangles"]),
+        (vec![text("b.obj", "glTF\u{2}\0\0\0")], &["b.obj"], vec!["b.obj", "a binary glTF", "rename it to .glb"]),
+        (vec![text("b.glb", "ply\nformat ascii 1.0\n")], &["b.glb"], vec!["b.glb", "a PLY", "rename it to .ply"]),
         (vec![File("t.png", bomb(60_000)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], &["b.obj"], vec!["t.png"]),
         (vec![File("t.png", bomb(2_000)), text("b.obj", TEXTURED), text("a.mtl", LIBRARY)], &["b.obj"], vec!["t.png"]),
         // As large as its sides may be, and really there: two hundred kilobytes for a gigabyte.

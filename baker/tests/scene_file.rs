@@ -76,6 +76,8 @@ fn every_kind_of_path() {
 fn errors_name_file_line_key_and_cure() {
     let head = "[scene]\nmodel = \"a.obj\"\n";
     for (text, expected) in [
+        (format!("{head}[camera]\nfov = .5\n"), vec!["line 4", "a digit before its point"]),
+        (format!("{head}[camera]\norbit = 3\n"), vec!["line 4", "camera.orbit", "expected a table"]),
         (format!("{head}[camera]\nfvo = 45\n"), vec!["szene eins.toml", "line 4", "camera.fvo", "did you mean `fov`"]),
         (format!("{head}[camera]\nfov = 180\n"), vec!["line 4", "camera.fov", "found 180", "between 0 and 180"]),
         (format!("{head}[camera]\nfov = nan\n"), vec!["camera.fov", "NaN"]),

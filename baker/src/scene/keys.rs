@@ -24,7 +24,7 @@ pub(crate) struct File {
 
 /// `[scene]`.
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(crate) struct SceneTable {
     pub model: Option<PathBuf>,
     pub heightfield: Option<HeightTable>,
@@ -35,7 +35,7 @@ pub(crate) struct SceneTable {
 
 /// `heightfield = { .. }`.
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(crate) struct HeightTable {
     pub heights: PathBuf,
     pub colour: Option<PathBuf>,
@@ -47,7 +47,7 @@ pub(crate) struct HeightTable {
 
 /// `[camera]`.
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(crate) struct CameraTable {
     pub fov: Option<f64>,
     #[serde(default, deserialize_with = "maybe")]
@@ -61,7 +61,7 @@ pub(crate) struct CameraTable {
 
 /// `orbit = { .. }`.
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(crate) struct OrbitTable {
     #[serde(deserialize_with = "list")]
     pub target: [f64; 3],
@@ -74,7 +74,7 @@ pub(crate) struct OrbitTable {
 
 /// `line = { .. }`.
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(crate) struct LineTable {
     #[serde(deserialize_with = "list")]
     pub from: [f64; 3],
@@ -88,7 +88,7 @@ pub(crate) struct LineTable {
 
 /// `spline = { .. }`.
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(crate) struct SplineTable {
     #[serde(deserialize_with = "lists")]
     pub points: Vec<[f64; 3]>,
@@ -98,7 +98,7 @@ pub(crate) struct SplineTable {
 
 /// `pivot = { .. }`.
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(crate) struct PivotTable {
     #[serde(deserialize_with = "list")]
     pub eye: [f64; 3],
@@ -110,7 +110,7 @@ pub(crate) struct PivotTable {
 
 /// `[playback]`.
 #[derive(Deserialize, Default)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(crate) struct PlaybackTable {
     #[serde(default, deserialize_with = "maybe")]
     pub size: Option<[i64; 2]>,
@@ -121,7 +121,7 @@ pub(crate) struct PlaybackTable {
 
 /// `[[light]]`.
 #[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
+#[serde(deny_unknown_fields, expecting = "a table")]
 pub(crate) struct LightTable {
     #[serde(deserialize_with = "list")]
     pub direction: [f64; 3],
@@ -210,6 +210,8 @@ impl Source<'_> {
             what.push_str(": add it");
         } else if e.message().contains("expected a sequence") && self.text.contains("[light]") {
             what.push_str(": a light's table is written [[light]]");
+        } else if e.message().contains("invalid mantissa") {
+            what.push_str(": a number has a digit before its point, 0.5");
         }
         let offset = e.span().map(|s| s.start);
         SceneError::Key {

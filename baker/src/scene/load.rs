@@ -6,6 +6,7 @@ use super::model::{Model, bounding_sphere, shared};
 use super::{Background, Light, Playback, Scene, SceneError, builtin, file, gltf, obj, ply};
 use crate::camera::Orbit;
 use glam::{DVec3, Vec3};
+use std::io::Read;
 use std::path::Path;
 
 /// What the command line says about the playback, over what the scene says.
@@ -98,6 +99,9 @@ pub fn load_builtin(name: &str, overrides: &Overrides) -> Result<Scene, SceneErr
 /// Loads a model by its ending; `None` if it is no model's. `texture` is for a model whose file names none.
 pub(crate) fn model(path: &Path, texture: Option<&Path>) -> Option<Result<Model, SceneError>> {
     let ending = path.extension()?.to_string_lossy().to_ascii_lowercase();
+    if let Some(what) = misnamed(path, &ending) {
+        return Some(Err(SceneError::Model { file: path.to_owned(), what }));
+    }
     let loaded = match ending.as_str() {
         "glb" | "gltf" => gltf::load(path, texture),
         "obj" => obj::load(path, texture),
@@ -105,6 +109,19 @@ pub(crate) fn model(path: &Path, texture: Option<&Path>) -> Option<Result<Model,
         _ => return None,
     };
     Some(loaded.and_then(|m| m.finish().map_err(|what| SceneError::Model { file: path.to_owned(), what })))
+}
+
+/// What is wrong with a model's name, if its first bytes are another format's.
+fn misnamed(path: &Path, ending: &str) -> Option<String> {
+    let mut head = Vec::new();
+    crate::files::open_to_read(path).ok()?.0.take(8).read_to_end(&mut head).ok()?;
+    let (kind, is) = match head.as_slice() {
+        [b'g', b'l', b'T', b'F', ..] => ("a binary glTF", "glb"),
+        [b'p', b'l', b'y', b'\n' | b'\r', ..] => ("a PLY", "ply"),
+        _ => return None,
+    };
+    // The glTF loader tells its two kinds apart itself.
+    (ending != is && (is, ending) != ("glb", "gltf")).then(|| format!("the name ends in .{ending}, and this is {kind}: rename it to .{is}"))
 }
 
 /// What a scene is called: its file's name without the ending.
