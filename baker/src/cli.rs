@@ -5,6 +5,7 @@ use crate::choices::{Charts, Outlines, Paint, Rewarp, Sheets, Space, Storage, Te
 use clap::{Args, Parser, Subcommand};
 use cubist_baker::atlas;
 use cubist_baker::chart::Family;
+use cubist_baker::scene::Up;
 use cubist_baker::{Goal, Options, TruthFrames};
 use cubist_core::format::{SPACE_CUBIC, SPACE_LINEAR, TIME_CUBIC, TIME_HOLD, TIME_LINEAR, TexelKind};
 use std::path::PathBuf;
@@ -54,7 +55,7 @@ pub enum Command {
 /// What `cubist-bake SCENE` takes.
 #[derive(Args, Debug)]
 pub struct Bake {
-    /// A scene file (.toml), a model (.glb .gltf .obj .ply), or builtin:NAME.
+    /// A scene file (.toml), a model (.glb .gltf .obj .ply .stl), or builtin:NAME.
     #[arg(required = true)]
     pub scene: Option<String>,
     /// The bundle to write; folders on the way are made.
@@ -234,6 +235,9 @@ pub struct Playback {
     /// Frame 0 follows the last frame.
     #[arg(long)]
     pub looping: bool,
+    /// The model's axis that points up: x, y, z, -x, -y or -z [default: as the scene file says, else z for .stl, y for others].
+    #[arg(long, value_name = "AXIS", allow_hyphen_values = true)]
+    pub up: Option<Up>,
     /// Turns the picture clockwise: 90, 180 or 270 degrees [default: 0].
     ///
     /// For a display that is mounted on its side: its own rows are then the bundle's, and nothing tears along a diagonal. The size is that before
@@ -266,7 +270,7 @@ pub struct Inspect {
 /// What `cubist-bake throughput` takes.
 #[derive(Args, Debug)]
 pub struct Throughput {
-    /// A scene file (.toml), a model (.glb .gltf .obj .ply), or builtin:NAME.
+    /// A scene file (.toml), a model (.glb .gltf .obj .ply .stl), or builtin:NAME.
     pub scene: String,
     /// What replaces the scene's playback.
     #[command(flatten)]

@@ -79,7 +79,7 @@ fn bake(name: &str, output: &Path, args: &Bake) -> Result<()> {
 }
 
 /// What scenes are read from, by the ends of their files' names.
-const INPUTS: [&str; 13] = ["toml", "glb", "gltf", "bin", "obj", "mtl", "ply", "png", "jpg", "jpeg", "gif", "tif", "tiff"];
+const INPUTS: [&str; 14] = ["toml", "glb", "gltf", "bin", "obj", "mtl", "ply", "stl", "png", "jpg", "jpeg", "gif", "tif", "tiff"];
 
 /// Refuses, as wrong usage, to write over the scene, or the report over the bundle; or to a name that only files of scenes have.
 fn distinct(scene: &str, output: &Path, report: Option<&Path>) {
@@ -137,13 +137,13 @@ fn throughput(args: &Throughput) -> Result<()> {
 
 /// Loads what SCENE names.
 fn load(name: &str, playback: &Playback) -> Result<Scene> {
-    let overrides =
-        scene::Overrides { size: playback.size, frames: playback.frames, fps: playback.fps, looping: playback.looping.then_some(true) };
+    let Playback { size, frames, fps, looping, up, turn } = *playback;
+    let overrides = scene::Overrides { size, frames, fps, looping: looping.then_some(true), up };
     let scene = match name.strip_prefix("builtin:") {
         Some(builtin) => scene::load_builtin(builtin, &overrides)?,
         None => scene::load(Path::new(name), &overrides)?,
     };
-    Ok(scene::turned(scene, playback.turn.unwrap_or(0)))
+    Ok(scene::turned(scene, turn.unwrap_or(0)))
 }
 
 fn threads(count: Option<u16>) -> Result<()> {

@@ -1,6 +1,6 @@
 //! Scene files and heightfields, written here: what is taken, and what the errors say.
 
-use cubist_baker::scene::{Background, Overrides, Scene, load};
+use cubist_baker::scene::{Background, Overrides, Scene, Up, load, load_builtin};
 use glam::{DVec3, Vec3};
 use std::path::Path;
 use tiff::encoder::{TiffEncoder, colortype};
@@ -50,7 +50,7 @@ fn a_whole_scene_file() {
     let pose = s.camera.pose(0.5);
     let (sin, cos) = 20f64.to_radians().sin_cos();
     assert!((pose.eye - DVec3::new(4.0 * cos, 1.0 + 4.0 * sin, 0.0)).length() < 1e-12 && pose.fov == 50.0);
-    let over = Overrides { size: Some((64, 48)), frames: Some(3), fps: Some(10), looping: Some(false) };
+    let over = Overrides { size: Some((64, 48)), frames: Some(3), fps: Some(10), looping: Some(false), up: None };
     let s = scene_with(text, |_| {}, &over).unwrap();
     assert_eq!((s.playback.width, s.playback.height, s.playback.frames, s.playback.fps, s.playback.looping), (64, 48, 3, 10, false));
     let e = scene_with(text, |_| {}, &Overrides { size: Some((0, 48)), ..over }).unwrap_err();
@@ -70,6 +70,28 @@ fn every_kind_of_path() {
     assert_eq!(path("fov = 30").pose(0.0).fov, 30.0);
     let dark = scene("[scene]\nmodel = \"a.obj\"\n").unwrap();
     assert!(dark.warnings.iter().any(|w| w.contains("no light")), "{:?}", dark.warnings);
+}
+
+#[test]
+fn models_stand_as_they_are_told_to() {
+    let text = |up: &str| format!("[scene]\nmodel = \"a.obj\"\n{up}");
+    let second = |s: Scene| s.triangles[0].position[2];
+    assert_eq!(second(scene(&text("")).unwrap()), DVec3::Y);
+    assert_eq!(second(scene(&text("up = \"z\"")).unwrap()), DVec3::NEG_Z);
+    // What the command line says comes first; a flat picture of a model need not stay one.
+    let over = |up| Overrides { up: Some(up), ..Overrides::default() };
+    assert_eq!(second(scene_with(&text("up = \"z\""), |_| {}, &over(Up::MinusY)).unwrap()), DVec3::NEG_Y);
+    let e = scene(&text("up = \"up\"")).unwrap_err();
+    assert!(e.contains("line 3: scene.up: found \"up\"; expected the model's axis"), "{e}");
+    let e = scene("[scene]\nbuiltin = \"arch\"\nup = \"z\"\n").unwrap_err();
+    assert!(e.contains("line 3: scene.up: stands beside builtin"), "{e}");
+    let e = load_builtin("arch", &over(Up::Z)).err().unwrap().to_string();
+    assert!(e.contains("--up: a built-in scene has no model"), "{e}");
+    // A camera that is tipped over for a model that lies: there is a better word for it.
+    let lying = scene(&text("[camera]\nup = [0, 0, 1]\n")).unwrap();
+    assert!(lying.warnings.iter().any(|w| w.contains("give scene.up")), "{:?}", lying.warnings);
+    let line = scene(&text("[camera]\nup = [0, 0, 1]\nline = { from = [0, 0, 1], to = [0, 1, 1], look = [0, 1, 0] }\n")).unwrap();
+    assert!(line.warnings.iter().all(|w| !w.contains("scene.up")), "{:?}", line.warnings);
 }
 
 #[test]

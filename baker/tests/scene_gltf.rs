@@ -1,6 +1,6 @@
 //! glTF files, sound and broken, written here byte by byte: what the loader makes of them.
 
-use cubist_baker::scene::{Overrides, Scene, SceneError, Wrap, load};
+use cubist_baker::scene::{Overrides, Scene, SceneError, Up, Wrap, load};
 use glam::{DVec3, Vec3};
 use serde_json::{Value, json};
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_4};
@@ -287,6 +287,10 @@ fn a_camera_follows_its_animated_parent_through_a_scene_file() {
         assert!((pose.fov - 45.0).abs() < 1e-5);
         assert!(scene.warnings.iter().any(|w| w.contains("/cameras/0/perspective/yfov")), "{:?}", scene.warnings);
     }
+    // A model that is stood up takes its cameras along.
+    let over = Overrides { up: Some(Up::Z), ..Overrides::default() };
+    let pose = load(&file, &over).unwrap().camera.pose(0.25);
+    assert_eq!((pose.eye, pose.forward, pose.right), (DVec3::new(2.0, 4.0, -1.0), DVec3::NEG_Y, DVec3::X));
     write("gltf = \"Nobody\"");
     let e = load(&file, &Overrides::default()).err().unwrap().to_string();
     assert!(e.contains("line 4") && e.contains("camera.gltf") && e.contains("\"Flight\""), "{e}");

@@ -1,4 +1,4 @@
-//! OBJ and PLY files, written here: what the loaders make of them.
+//! OBJ, PLY and STL files, written here: what the loaders make of them.
 
 use cubist_baker::scene::{Overrides, Scene, load};
 use glam::{DVec3, Vec2, Vec3};
@@ -177,8 +177,52 @@ fn ply_faults_are_errors() {
 
 #[test]
 fn an_unknown_ending_is_told_what_is_expected() {
-    let e = with(&[("a.stl", b"solid")], "a.stl").unwrap_err();
-    assert!(e.contains(".stl") && e.contains(".glb"), "{e}");
+    let e = with(&[("a.fbx", b"Kaydara")], "a.fbx").unwrap_err();
+    assert!(e.contains(".fbx") && e.contains(".glb") && e.contains(".stl"), "{e}");
     let e = load(Path::new("/no/such/file"), &Overrides::default()).err().unwrap().to_string();
     assert!(e.contains("no such file"), "{e}");
+}
+
+/// Two triangles that stand on the plane of x and y, Z up, as a binary STL file.
+fn stl(head: &str) -> Vec<u8> {
+    let mut out = format!("{head:80}").into_bytes();
+    out.extend(2u32.to_le_bytes());
+    for last in [[0f32, 0.0, 3.0], [0.0, -1.0, 3.0]] {
+        // Its normal says nothing true.
+        for number in [9.0, 9.0, 9.0].into_iter().chain([0.0, 0.0, 0.0, 2.0, 0.0, 0.0]).chain(last) {
+            out.extend(number.to_le_bytes());
+        }
+        out.extend([0, 0]);
+    }
+    out
+}
+
+const STL: &str = "solid a b\r\nfacet normal 0 0 0\r\n outer loop\r\n  vertex 0 0 0\r\n  vertex 2 0 0\r\n  vertex 0 0 3e0\r\n endloop\r\nendfacet\r\nendsolid a b\r\n\
+                   SOLID\nFACET NORMAL 0 0 0\nOUTER LOOP\nVERTEX 0 0 0\nVERTEX 2.0E+0 0 0\nVERTEX 0 -1 3\nENDLOOP\nENDFACET\n\nENDSOLID\n";
+
+#[test]
+fn stl_binary_and_text_agree_and_stand_up() {
+    for bytes in [stl("by hand"), stl("solid, says the head"), STL.as_bytes().to_vec(), [&stl(""), &b"left over"[..]].concat()] {
+        let scene = with(&[("a.stl", &bytes)], "a.stl").unwrap();
+        let positions: Vec<_> = scene.triangles.iter().map(|t| t.position[2]).collect();
+        assert_eq!(positions, [DVec3::new(0.0, 3.0, 0.0), DVec3::new(0.0, 3.0, 1.0)]);
+        assert_eq!((scene.triangles[0].position[1], scene.triangles[0].normal), (DVec3::X * 2.0, [Vec3::ZERO; 3]));
+        assert_eq!(scene.lights.len(), 1);
+    }
+}
+
+#[test]
+fn stl_faults_say_what_is_wrong() {
+    let text = |end: usize| STL.as_bytes()[..end].to_vec();
+    for (bytes, expected) in [
+        (stl("")[..183].to_vec(), "2 triangles need 184 bytes, but the file has 183"),
+        (Vec::new(), "0 bytes; expected 84 at least"),
+        (b"STLF or so".to_vec(), "10 bytes"),
+        (text(100), "triangle 0"),
+        (text(STL.len() - 20), "triangle 1"),
+        (b"solid\nendsolid\n".to_vec(), "no triangles"),
+    ] {
+        let e = with(&[("a.stl", &bytes)], "a.stl").unwrap_err();
+        assert!(e.contains("a.stl: ") && e.contains(expected), "expected \"{expected}\" in: {e}");
+    }
 }

@@ -22,7 +22,7 @@ const EXAMPLES: &str = "\
 Examples:
   cubist-player                          bake the built-in demo and play it
   cubist-player street.cubist            play a bundle
-  cubist-player lantern.toml             bake a scene (.toml .glb .gltf .obj .ply), then play it
+  cubist-player lantern.toml             bake a scene (.toml .glb .gltf .obj .ply .stl), then play it
   cubist-player --headless street.cubist --out pictures
                                          no window: every frame as a PNG, and a GIF, into ./pictures
   cubist-player --headless --shot out.png --frames 10 street.cubist

@@ -6,12 +6,10 @@ use crate::cli::Usage;
 use crate::progress::progress;
 use anyhow::{Context, Result, anyhow};
 use cubist_baker::files::same;
+use cubist_baker::scene::MODELS;
 use cubist_baker::terminal::tell;
 use cubist_core::Bundle;
 use std::path::Path;
-
-/// Endings of files that are baked rather than played.
-const SCENES: [&str; 5] = ["toml", "glb", "gltf", "obj", "ply"];
 
 /// A bundle's bytes and where they come from.
 pub struct Loaded {
@@ -33,7 +31,7 @@ pub fn load(path: Option<&Path>) -> Result<Loaded> {
         return baked(name.clone(), Scene::Builtin(scene));
     }
     let ending = path.extension().map(|e| e.to_string_lossy().to_lowercase());
-    if ending.is_some_and(|e| SCENES.contains(&e.as_str())) {
+    if ending.is_some_and(|e| e == "toml" || MODELS.contains(&e.as_str())) {
         return baked(name, Scene::File(path));
     }
     let bytes = cubist_baker::files::read(path)

@@ -1,6 +1,7 @@
 //! What can be wrong with a scene, said so that it can be put right; and what was merely approximated.
 //! Filled by the loaders; shown by the programs.
 
+use super::load::MODELS_TOLD;
 use std::path::PathBuf;
 
 /// Why a scene cannot be loaded. Every message names the file, the place in it, what was found and what to do.
@@ -15,7 +16,7 @@ pub enum SceneError {
         what: String,
     },
     /// The name's ending is none of ours.
-    #[error("load {}: the name ends in {found}; expected a scene file (.toml) or a model (.glb, .gltf, .obj, .ply)", .file.display())]
+    #[error("load {}: the name ends in {found}; expected a scene file (.toml) or a model ({MODELS_TOLD})", .file.display())]
     Kind {
         /// The file.
         file: PathBuf,

@@ -3,8 +3,9 @@
 
 use super::error::{SceneError, Warnings};
 use super::keys::{CameraTable, File, HeightTable, LightTable, Source};
-use super::load::{self, BACKGROUND, FOV, MAX_FPS, MAX_FRAMES, MAX_SCREEN, Overrides, PLAYBACK};
+use super::load::{self, BACKGROUND, FOV, MAX_FPS, MAX_FRAMES, MAX_SCREEN, MODELS_TOLD, Overrides, PLAYBACK};
 use super::model::{Model, shared};
+use super::up::Along;
 use super::{Background, Light, Playback, Scene, Triangle, Wrap, heightfield, picture};
 use crate::camera::{self, Aim, Line, Orbit, Pivot, Spline};
 use glam::{DVec3, Vec3};
@@ -26,7 +27,7 @@ pub(crate) fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneErr
         return builtin(&source, &file, name, lights, overrides);
     }
     let playback = overrides.apply(playback(&source, &file, PLAYBACK)?)?;
-    let mut model = model(&source, &file, &playback, lights.is_empty())?;
+    let mut model = model(&source, &file, &playback, lights.is_empty(), overrides)?;
     let camera = match &file.camera {
         Some(table) => match path_of(&source, table, FOV, Some(&model))? {
             Some(path) => path,
@@ -39,6 +40,11 @@ pub(crate) fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneErr
     };
     if file.camera.as_ref().is_some_and(|c| c.gltf.is_some() && c.up.is_some()) {
         model.warnings.add("camera.up is ignored: the model's camera has its own");
+    }
+    if file.camera.as_ref().is_some_and(tips_over) {
+        model
+            .warnings
+            .add("camera.up tips the camera over; circles go round +Y all the same: for a model that stands another way up, give scene.up");
     }
     let colour = |t: &Triangle| model.materials.get(t.material as usize).map(|m| m.colour);
     let plain = model.textures.is_empty() && !model.coloured && model.triangles.windows(2).all(|t| colour(&t[0]) == colour(&t[1]));
@@ -64,11 +70,13 @@ fn builtin(source: &Source<'_>, file: &File, name: &str, lights: Vec<Light>, ove
         ("model", file.scene.model.is_some()),
         ("heightfield", file.scene.heightfield.is_some()),
         ("texture", file.scene.texture.is_some()),
+        ("up", file.scene.up.is_some()),
     ] {
         if given {
             return Err(source.error(&format!("scene.{other}"), format!("stands beside builtin = \"{name}\": remove one of them")));
         }
     }
+    overrides.no_model("a built-in scene")?;
     let mut scene = load::load_builtin(name, &Overrides::default()).map_err(|e| source.error("scene.builtin", e.to_string()))?;
     scene.name = load::name(source.file);
     scene.playback = overrides.apply(playback(source, file, scene.playback)?)?;
@@ -96,6 +104,13 @@ fn builtin(source: &Source<'_>, file: &File, name: &str, lights: Vec<Light>, ove
     Ok(scene)
 }
 
+/// Whether `up` is across the axis that the camera goes or turns round.
+fn tips_over(table: &CameraTable) -> bool {
+    let straight = table.line.is_some() || table.spline.is_some() || table.gltf.is_some();
+    let up = table.up.map(DVec3::from_array).and_then(DVec3::try_normalize);
+    !straight && up.is_some_and(|up| up.y.abs() < 0.5)
+}
+
 /// A built-in scene's path with another field of view.
 struct WithFov {
     path: Arc<dyn camera::Path>,
@@ -113,7 +128,7 @@ fn beside(source: &Source<'_>, path: &Path) -> PathBuf {
     source.file.parent().unwrap_or(Path::new("")).join(path)
 }
 
-fn model(source: &Source<'_>, file: &File, playback: &Playback, unlit: bool) -> Result<Model, SceneError> {
+fn model(source: &Source<'_>, file: &File, playback: &Playback, unlit: bool, overrides: &Overrides) -> Result<Model, SceneError> {
     match (&file.scene.model, &file.scene.heightfield) {
         (Some(_), Some(_)) => {
             Err(source.error("scene.heightfield", "stands beside model: exactly one source is expected, remove one of them"))
@@ -126,14 +141,16 @@ fn model(source: &Source<'_>, file: &File, playback: &Playback, unlit: bool) -> 
             if let Some(texture) = &texture {
                 check_file(source, "scene.texture", texture)?;
             }
-            load::model(&full, texture.as_deref()).unwrap_or_else(|| {
-                Err(source.error(
-                    "scene.model",
-                    format!("found \"{}\"; expected a .glb, .gltf, .obj or .ply file: convert the model", path.display()),
-                ))
+            let up = file.scene.up.as_ref().map(|up| up.parse().map_err(|what| source.error("scene.up", what))).transpose()?;
+            load::model(&full, texture.as_deref(), overrides.up.or(up)).unwrap_or_else(|| {
+                Err(source.error("scene.model", format!("found \"{}\"; expected a {MODELS_TOLD} file: convert the model", path.display())))
             })
         }
         (None, Some(table)) => {
+            overrides.no_model("a heightfield")?;
+            if file.scene.up.is_some() {
+                return Err(source.error("scene.up", "is for models; a heightfield's heights point up: remove it"));
+            }
             if file.scene.texture.is_some() {
                 return Err(source.error("scene.texture", "is for models; a heightfield's picture is its colour = \"..\": move it there"));
             }
@@ -258,7 +275,7 @@ fn path_of(source: &Source<'_>, table: &CameraTable, fov: f64, model: Option<&Mo
         };
         let mut path = model.camera(name).map_err(|what| source.error("camera.gltf", what))?;
         path.fov = table.fov.unwrap_or(path.fov);
-        return Ok(Some(shared(path)));
+        return Ok(Some(shared(Along { path, up: model.up })));
     }
     Ok(None)
 }

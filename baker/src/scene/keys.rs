@@ -30,6 +30,7 @@ pub(crate) struct SceneTable {
     pub heightfield: Option<HeightTable>,
     pub builtin: Option<String>,
     pub texture: Option<PathBuf>,
+    pub up: Option<String>,
     pub background: Option<String>,
 }
 

@@ -3,13 +3,13 @@
 
 use super::error::nearest;
 use super::model::{Model, bounding_sphere, shared};
-use super::{Background, Light, Playback, Scene, SceneError, builtin, file, gltf, obj, ply};
+use super::{Background, Light, Playback, Scene, SceneError, Up, builtin, file, gltf, obj, ply, stl};
 use crate::camera::Orbit;
 use glam::{DVec3, Vec3};
 use std::io::Read;
 use std::path::Path;
 
-/// What the command line says about the playback, over what the scene says.
+/// What the command line says about the scene and its playback, over what the scene says.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Overrides {
     /// Screen width and height, pixels, 1..=4096 each.
@@ -20,8 +20,14 @@ pub struct Overrides {
     pub fps: Option<u16>,
     /// Whether frame 0 follows the last frame.
     pub looping: Option<bool>,
+    /// The model's axis that points up.
+    pub up: Option<Up>,
 }
 
+/// What the names of models end in,
+pub const MODELS: [&str; 5] = ["glb", "gltf", "obj", "ply", "stl"];
+/// and how messages tell them.
+pub(crate) const MODELS_TOLD: &str = ".glb, .gltf, .obj, .ply or .stl";
 /// The longest side of a screen, pixels.
 pub(crate) const MAX_SCREEN: u32 = 4096;
 /// The most frames.
@@ -36,6 +42,12 @@ pub(crate) const FOV: f64 = 45.0;
 pub(crate) const BACKGROUND: [u8; 3] = [0x20, 0x28, 0x30];
 
 impl Overrides {
+    /// An error if they are about a model, which `what` has not.
+    pub(crate) fn no_model(&self, what: &str) -> Result<(), SceneError> {
+        let error = SceneError::Override { option: "--up", what: format!("{what} has no model to turn: remove it") };
+        self.up.map_or(Ok(()), |_| Err(error))
+    }
+
     /// The playback with the overrides applied; an override out of range is an error.
     pub(crate) fn apply(&self, mut playback: Playback) -> Result<Playback, SceneError> {
         let error = |option, what| Err(SceneError::Override { option, what });
@@ -62,7 +74,7 @@ impl Overrides {
     }
 }
 
-/// Loads a scene file (.toml) or a model alone (.glb .gltf .obj .ply). A model alone gets a full-circle, looping orbit
+/// Loads a scene file (.toml) or a model alone (.glb .gltf .obj .ply .stl). A model alone gets a full-circle, looping orbit
 /// around its bounding sphere at 20 degrees of elevation, 320 x 240 pixels, 120 frames at 30 frames per second, and one
 /// light if most of it has neither textures nor vertex colours.
 ///
@@ -72,7 +84,7 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneError> {
     let ending = path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase());
     match ending.as_deref() {
         Some("toml") => file::load(path, overrides),
-        Some("glb" | "gltf" | "obj" | "ply") => alone(path, overrides),
+        Some(ending) if MODELS.contains(&ending) => alone(path, overrides),
         other => {
             // What is not there at all is told so first.
             crate::files::open_to_read(path).map_err(|what| SceneError::Read { file: path.to_owned(), what })?;
@@ -87,6 +99,7 @@ pub fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneError> {
 /// # Errors
 /// An unknown name, or an override out of range.
 pub fn load_builtin(name: &str, overrides: &Overrides) -> Result<Scene, SceneError> {
+    overrides.no_model("a built-in scene")?;
     let mut scene = builtin::build(name).ok_or_else(|| SceneError::Builtin {
         name: name.to_owned(),
         near: nearest(name, builtin::NAMES.iter().copied()).map(str::to_owned),
@@ -96,8 +109,8 @@ pub fn load_builtin(name: &str, overrides: &Overrides) -> Result<Scene, SceneErr
     Ok(scene)
 }
 
-/// Loads a model by its ending; `None` if it is no model's. `texture` is for a model whose file names none.
-pub(crate) fn model(path: &Path, texture: Option<&Path>) -> Option<Result<Model, SceneError>> {
+/// Loads a model by its ending; `None` if it is no model's. `texture` is for a model whose file names none; `up` is Z in STL files unless given, else Y.
+pub(crate) fn model(path: &Path, texture: Option<&Path>, up: Option<Up>) -> Option<Result<Model, SceneError>> {
     let ending = path.extension()?.to_string_lossy().to_ascii_lowercase();
     if let Some(what) = misnamed(path, &ending) {
         return Some(Err(SceneError::Model { file: path.to_owned(), what }));
@@ -106,9 +119,11 @@ pub(crate) fn model(path: &Path, texture: Option<&Path>) -> Option<Result<Model,
         "glb" | "gltf" => gltf::load(path, texture),
         "obj" => obj::load(path, texture),
         "ply" => ply::load(path, texture),
+        "stl" => stl::load(path, texture),
         _ => return None,
     };
-    Some(loaded.and_then(|m| m.finish().map_err(|what| SceneError::Model { file: path.to_owned(), what })))
+    let up = up.unwrap_or(if ending == "stl" { Up::Z } else { Up::Y });
+    Some(loaded.and_then(|m| m.finish().map_err(|what| SceneError::Model { file: path.to_owned(), what })).map(|m| m.stand(up)))
 }
 
 /// What is wrong with a model's name, if its first bytes are another format's.
@@ -140,7 +155,7 @@ pub(crate) fn turntable(model: &Model, playback: &Playback, fov: f64, up: DVec3)
 }
 
 fn alone(path: &Path, overrides: &Overrides) -> Result<Scene, SceneError> {
-    let Some(loaded) = model(path, None) else {
+    let Some(loaded) = model(path, None, overrides.up) else {
         return Err(SceneError::Kind { file: path.to_owned(), found: "nothing".to_owned() });
     };
     let mut model = loaded?;

@@ -15,12 +15,15 @@ mod picture;
 mod ply;
 mod polygon;
 mod split;
+mod stl;
 mod turned;
+mod up;
 
 pub use error::SceneError;
-pub use load::{Overrides, load, load_builtin};
+pub use load::{MODELS, Overrides, load, load_builtin};
 pub(crate) use split::split;
 pub use turned::turned;
+pub use up::Up;
 
 use crate::camera::Path;
 use glam::{DVec3, Vec2, Vec3};

@@ -1,8 +1,8 @@
 //! What a model's loader hands over: triangles in world space and how they look; and the last checks on them.
-//! Filled by the loaders of glTF, OBJ, PLY and heightfields; goes to `load` and `file`.
+//! Filled by the loaders of glTF, OBJ, PLY, STL and heightfields; goes to `load` and `file`.
 
 use super::error::Warnings;
-use super::{Material, Texture, Triangle};
+use super::{Material, Texture, Triangle, Up};
 use crate::camera::Path;
 use glam::DVec3;
 use std::sync::Arc;
@@ -31,6 +31,8 @@ pub(crate) struct Model {
     pub cameras: Vec<ModelCamera>,
     /// Whether any vertex has a colour of its own.
     pub coloured: bool,
+    /// Which axis pointed up in the file; the cameras are still as they were there.
+    pub up: Up,
 }
 
 /// The centre and the radius of a sphere around all triangles: the middle of their bounding box, and the farthest corner.
@@ -79,6 +81,16 @@ impl Model {
             }
         }
         Ok(self)
+    }
+
+    /// Turns it such that its axis `up` points up.
+    pub(crate) fn stand(mut self, up: Up) -> Self {
+        if up != Up::Y {
+            for t in &mut self.triangles {
+                (t.position, t.normal) = (t.position.map(|v| up.turn(v)), t.normal.map(|v| up.turn_normal(v)));
+            }
+        }
+        Self { up, ..self }
     }
 
     /// Whether more than three quarters of its surface would show nothing but its outline without light.
