@@ -3,9 +3,9 @@
 use crate::bake::{self, BakeError, Encoded, Fitted, Flat, Settings};
 use crate::encode::image_bytes;
 use crate::metrics;
-use crate::report::grouped;
 use crate::scene::Scene;
 use crate::spare::DOUBLE;
+use crate::terminal::grouped;
 use crate::verify::{self, Brief};
 
 /// A bundle, what made it, and how good it is.

@@ -6,9 +6,9 @@ use crate::bake::{self, BakeError, Fitted, Flat, Progress};
 use crate::finer;
 use crate::made::Made;
 use crate::metrics;
-use crate::report::grouped;
 use crate::scene::Scene;
 use crate::spare::DOUBLE;
+use crate::terminal::grouped;
 use serde::{Deserialize, Serialize};
 
 /// One outline, tried.

@@ -10,7 +10,7 @@ use crate::encode::{image_bytes, with_section};
 use crate::inspect::{space_name, time_name};
 use crate::job::{Chosen, Whole};
 use crate::metrics;
-use crate::report::grouped;
+use crate::terminal::grouped;
 use crate::tune::{Search, possible};
 use crate::verify;
 use cubist_core::Bundle;

@@ -11,9 +11,9 @@ use crate::job::{self, Chosen, Whole};
 use crate::metrics;
 use crate::options::{Goal, Options};
 use crate::repaint::Painter;
-use crate::report::grouped;
 use crate::samples::Samples;
 use crate::scene::Scene;
+use crate::terminal::grouped;
 use crate::verify;
 use std::time::Instant;
 
