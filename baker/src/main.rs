@@ -13,7 +13,7 @@ use cli::{Bake, Cli, Command, Inspect, Playback, Throughput};
 use cubist_baker::inspect::Inspection;
 use cubist_baker::scene::Scene;
 use cubist_baker::terminal::{self, aligned, grouped, print, tell};
-use cubist_baker::{files, job, report, scene, trace};
+use cubist_baker::{files, job, report, scene, throughput};
 use indicatif::ProgressBar;
 use serde_json::json;
 use std::path::Path;
@@ -110,7 +110,7 @@ fn inspect(args: &Inspect) -> Result<()> {
 fn throughput(args: &Throughput) -> Result<()> {
     threads(args.threads)?;
     let scene = load(&args.scene, &args.playback)?;
-    let figures = trace::throughput(&scene);
+    let figures = throughput::measured(&scene);
     let ratio = if figures.obvhs_alone > 0.0 { figures.ours / figures.obvhs_alone } else { 0.0 };
     if args.json {
         let document = json!({

@@ -86,8 +86,9 @@ pub fn reason(trials: &[Trial]) -> String {
 mod tests {
     use super::*;
     use crate::atlas;
-    use crate::bake::{Coverage, Settings};
+    use crate::bake::Settings;
     use crate::chart::Family;
+    use crate::order::Coverage;
     use crate::scene::builtin;
     use cubist_core::format::SPACE_LINEAR;
 
