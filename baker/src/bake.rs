@@ -32,6 +32,9 @@ pub enum BakeError {
     /// The key interval is out of range.
     #[error("--key-interval: expected 1 to 256 frames, found {0}")]
     KeyInterval(u32),
+    /// There are more pixels than 32 bits number.
+    #[error("--frames: expected at most {most} pixels in all frames together, found {0}; lower it, or --size", most = u32::MAX)]
+    Pixels(u64),
     /// There is no source image.
     #[error(transparent)]
     Atlas(#[from] AtlasError),

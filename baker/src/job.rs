@@ -42,6 +42,11 @@ pub fn bake_scene(scene: &Scene, options: &Options, progress: Progress<'_>) -> R
 /// # Errors
 /// The same.
 pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<Baked, BakeError> {
+    let play = &scene.playback;
+    let pixels = u64::from(play.width) * u64::from(play.height) * u64::from(play.frames);
+    if pixels > u64::from(u32::MAX) {
+        return Err(BakeError::Pixels(pixels));
+    }
     progress("building the hierarchy", 0.0);
     // Charts that the scene brings are as it wants them.
     let split = if chart::brings_own(scene) { None } else { scene::split(scene) };
@@ -249,5 +254,19 @@ fn choice(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Res
             }
             choose::charts(tracer, &settings, options.rewarp, progress)
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::builtin;
+
+    #[test]
+    fn more_pixels_than_can_be_numbered_are_refused() {
+        let mut scene = builtin::build("pyramid").unwrap();
+        (scene.playback.width, scene.playback.height, scene.playback.frames) = (4096, 4096, 256);
+        let error = run(&scene, &Options::default(), &|_, _| {}).err();
+        assert_eq!(error, Some(BakeError::Pixels(1 << 32)));
     }
 }
