@@ -9,12 +9,13 @@ use crate::encode::{self, CodingSettings, Content};
 use crate::fit::{self, Fit};
 use crate::folds::{self, Folded};
 use crate::gbuffer::Lens;
+use crate::order::{self, Coverage};
 use crate::planes::{self, FlatChart};
 use crate::scene::Scene;
 use crate::sheets::{self, KeyGrid, Layers, Sheets};
 use crate::verify::VerifyError;
 use crate::walls;
-use crate::{brinks, cuts, order, prune, settle, spare, tears, timing};
+use crate::{brinks, cuts, prune, settle, spare, tears, timing};
 use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC};
 use std::time::Instant;
 use thiserror::Error;
@@ -31,6 +32,9 @@ pub enum BakeError {
     /// The key interval is out of range.
     #[error("--key-interval: expected 1 to 256 frames, found {0}")]
     KeyInterval(u32),
+    /// There are more pixels than 32 bits number.
+    #[error("--frames: expected at most {most} pixels in all frames together, found {0}; lower it, or --size", most = u32::MAX)]
+    Pixels(u64),
     /// There is no source image.
     #[error(transparent)]
     Atlas(#[from] AtlasError),
@@ -85,18 +89,6 @@ pub enum BakeError {
     /// The scene is more than a bundle can hold.
     #[error(transparent)]
     Limit(#[from] encode::Exceeded),
-}
-
-/// The coverage tests that torn cells may use: all of them, or one alone to see what it is worth.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Coverage {
-    /// Charts, fields, and both at once, whichever tells best in each cell.
-    #[default]
-    All,
-    /// Charts alone: no fields are stored.
-    Chart,
-    /// Fields alone.
-    Field,
 }
 
 /// Whether keys are coded coarser than their settings say.
@@ -222,6 +214,11 @@ pub(crate) fn flat(cast: &Cast<'_>, atlas: Atlas) -> Flat {
     let planes = planes::find(scene, hits, &atlas.gbuffer, atlas.image.labels.len());
     let crossed = walls::crossed(scene, tracer);
     Flat { tears, seams, planes, crossed, rays: hits.samples.len() as u64, atlas, ray_seconds: 0.0, atlas_seconds: 0.0 }
+}
+
+/// Refuses a path that shows nothing but background.
+pub(crate) fn something_seen(flat: &Flat) -> Result<(), BakeError> {
+    if flat.atlas.gbuffer.label.iter().all(|&label| label == 0) { Err(BakeError::Nothing { rays: flat.rays }) } else { Ok(()) }
 }
 
 /// How much of `total` is done, 0..=1.

@@ -80,9 +80,9 @@ fn to_edge(image: &SourceImage, chart: &Chart, [u, v]: [f32; 2], inside: bool) -
 mod tests {
     use super::*;
     use crate::atlas::{Label, Outline};
-    use crate::bake::Coverage;
     use crate::fit::Fit;
     use crate::gbuffer::GBuffer;
+    use crate::order::Coverage;
     use crate::sheets::{self, KeyGrid, Layers};
     use cubist_core::format::{SPACE_LINEAR, TIME_LINEAR, TexelKind};
 

@@ -2,11 +2,10 @@
 //! Scenes and settings come from `job`, which bakes what is chosen; the report and the bundle say why.
 
 use crate::atlas::{self, LONGER, Storage};
-use crate::bake::{self, BakeError, Flat, Progress, Settings, Sparing};
+use crate::bake::{self, BakeError, Flat, Progress, Settings, Sparing, something_seen};
 use crate::cast::Cast;
 use crate::chart::{self, Charting, Choice, Family, Trial};
 use crate::encode;
-use crate::job::something_seen;
 use crate::scene::Scene;
 use crate::trace::Tracer;
 use crate::truth::Truth;

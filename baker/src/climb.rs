@@ -2,12 +2,12 @@
 //! start, what may change and what a bundle is worth to them; which steps are tried, and in which order, depends on nothing else.
 
 use crate::bake::{BakeError, Settings};
+use crate::spare::LAMBDAS;
 use cubist_core::format::{SPACE_CUBIC, SPACE_LINEAR, TIME_CUBIC, TIME_LINEAR};
 
-/// Cells, pixels; key intervals, frames; what a bit is worth: the rungs that steps lead to.
+/// Cells, pixels; key intervals, frames: the rungs that steps lead to, and those of [`LAMBDAS`].
 const CELLS: [u32; 4] = [4, 8, 16, 32];
 const INTERVALS: [u32; 14] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 24, 32, 48, 64];
-pub(crate) const LAMBDAS: [f32; 5] = [0.01, 0.03, 0.1, 0.3, 1.0];
 /// The longest interval between keys, frames.
 const LONGEST: u32 = 256;
 /// What a step has to bring to be taken, in whatever the score counts.

@@ -11,7 +11,8 @@ use crate::scene::Scene;
 /// Those of encoding, and of the player.
 pub(crate) fn anew(scene: &Scene, flat: &Flat, made: Made, progress: Progress<'_>) -> Result<Made, BakeError> {
     progress("pruning sheets", 0.0);
-    let all = Made::new(scene, flat, Settings { error: 0.0, ..made.settings })?;
+    // All sheets of smaller cells may be more than a bundle can hold.
+    let Some(all) = Made::tried(scene, flat, Settings { error: 0.0, ..made.settings })? else { return Ok(made) };
     let picture = made.picture(flat);
     let other = choose(scene, flat, all, progress)?;
     Ok(if other.worth(picture) > made.worth(picture) { other } else { made })

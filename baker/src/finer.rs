@@ -181,7 +181,8 @@ pub(crate) fn choose(
             }
             progress("trying other cells", f64::from(tried) / most as f64);
             tried += 1;
-            let made = Made::new(scene, flat, Settings { space: space(settings.cell), ..*settings })?;
+            // Smaller cells may be more than a bundle can hold: then the usual ones it is.
+            let Some(made) = Made::tried(scene, flat, Settings { space: space(settings.cell), ..*settings })? else { return Ok(None) };
             let gained = gained(&made)?;
             if gained > better.as_ref().map_or(0.0, |&(most, _)| most) {
                 better = Some((gained, made));

@@ -3,7 +3,7 @@
 
 use crate::encode::{Unpacked, unpacked};
 use cubist_core::format::{
-    ATLAS, FIXED, INFO, LABELS, MASK, MASKED, PATH, SPACE_LINEAR, STRIP, TIME_HOLD, TIME_LINEAR, TexelKind, VERSION,
+    ATLAS, FIXED, INFO, LABELS, Limits, MASK, MASKED, PATH, SPACE_LINEAR, STRIP, TIME_HOLD, TIME_LINEAR, TexelKind, VERSION,
 };
 use cubist_core::mask::Tile;
 use cubist_core::plane::Plane;
@@ -147,31 +147,6 @@ impl MaskInfo {
     }
 }
 
-/// The bounds that a bundle states.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-pub struct LimitsInfo {
-    /// Layers in a key.
-    pub key_layers: u16,
-    /// Layers in a row of nodes.
-    pub row_layers: u16,
-    /// Chains in a key, each of layers of one label at neighbouring nodes of a row.
-    pub key_chains: u16,
-    /// Chains in a row of nodes.
-    pub row_chains: u16,
-    /// Layers of a key in chains that some cell tests.
-    pub key_fields: u16,
-    /// Bytes of an interval's sheet lists.
-    pub list_bytes: u16,
-    /// Sheets in a row of cells.
-    pub row_sheets: u16,
-    /// Sheets in a cell.
-    pub cell_sheets: u8,
-    /// Keys that one seek decodes.
-    pub seek_keys: u16,
-    /// Distances from outlines that a layer carries.
-    pub fields: u8,
-}
-
 /// Everything there is to say about a bundle without playing it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Inspection {
@@ -200,7 +175,7 @@ pub struct Inspection {
     /// Working memory that a player asks for, bytes.
     pub workspace: usize,
     /// The stated bounds.
-    pub limits: LimitsInfo,
+    pub limits: Limits,
     /// The text for people, if there is one.
     pub info: Option<String>,
 }
@@ -241,7 +216,6 @@ impl Inspection {
         let image = unpacked(&bundle);
         let raw_bytes = image.bytes();
         let mask = bundle.masked().then(|| MaskInfo::new(&image));
-        let limits = bundle.limits();
         Ok(Self {
             version: VERSION,
             bytes: bytes.len(),
@@ -289,18 +263,7 @@ impl Inspection {
             palette: atlas.palette.as_chunks::<2>().0.iter().map(|&colour| hex(u16::from_le_bytes(colour))).collect(),
             labels: (0..bundle.label_count()).map(|label| label_info(&bundle, label as u8)).collect(),
             workspace: bundle.memory_needed(),
-            limits: LimitsInfo {
-                key_layers: limits.key_layers,
-                row_layers: limits.row_layers,
-                key_chains: limits.key_chains,
-                row_chains: limits.row_chains,
-                key_fields: limits.key_fields,
-                list_bytes: limits.list_bytes,
-                row_sheets: limits.row_sheets,
-                cell_sheets: limits.cell_sheets,
-                seek_keys: limits.seek_keys,
-                fields: limits.fields,
-            },
+            limits: bundle.limits(),
             info: find(INFO).map(|text| String::from_utf8_lossy(text).into_owned()),
         })
     }

@@ -1,8 +1,9 @@
 //! A whole job: a scene and what the user asks of its bundle in; the bundle, verified, and its report out.
 //! The stages are `bake`'s, the search is `tune`'s, the figures are `verify`'s.
 
-use crate::atlas::{self, Storage};
-use crate::bake::{self, BakeError, Encoded, Fitted, Flat, Progress, Settings};
+use crate::atlas;
+use crate::bake::{self, BakeError, Fitted, Flat, Progress, Settings, something_seen};
+pub use crate::baked::Baked;
 use crate::bends::Bends;
 use crate::cast::Cast;
 use crate::chart::{self, Choice, Family};
@@ -20,49 +21,12 @@ use crate::seen::Seen;
 use crate::straight;
 use crate::trace::Tracer;
 use crate::truth::{Truth, spread};
-use crate::{tune, usual, verify};
+use crate::tune::{self, Chosen, Whole};
+use crate::{usual, verify};
 use std::time::Instant;
 
 /// Keys that trials of charts have, at least, on paths with as many frames; on brief ones twice as many.
 const TRIAL_KEYS: u32 = 16;
-
-/// A finished job.
-pub struct Baked {
-    /// The bundle's bytes.
-    pub bundle: Vec<u8>,
-    /// What they cost and reach.
-    pub report: Report,
-    /// The source image and the G-buffer they came from.
-    pub flat: Flat,
-    /// What made them.
-    pub settings: Settings,
-    /// Mean PSNR against exact rays before texels were coloured by what is played, dB.
-    pub(crate) psnr_before: f64,
-    /// Whether the search that found it leaves room for what is baked where nothing is asked for: how that has to be stored.
-    pub(crate) contested: Option<Storage>,
-}
-
-/// What was chosen: by the settings or by a search.
-pub(crate) struct Chosen {
-    pub flat: Flat,
-    pub encoded: Encoded,
-    pub settings: Settings,
-    /// Seconds for what was tried and not kept.
-    pub search_seconds: f64,
-    /// What the user should know about the choice.
-    pub warnings: Vec<String>,
-    /// Whether the search leaves room for what is baked where nothing is asked for: how that has to be stored.
-    pub contested: Option<Storage>,
-}
-
-/// A bundle that needs more memory than there is.
-#[derive(Clone, Copy)]
-pub(crate) struct Whole {
-    pub settings: Settings,
-    pub memory: usize,
-    /// Mean PSNR against exact rays before texels are coloured by what is played, dB.
-    pub psnr: f64,
-}
 
 /// Bakes a scene, verifies the bundle and reports; `progress` hears the stages.
 ///
@@ -78,6 +42,11 @@ pub fn bake_scene(scene: &Scene, options: &Options, progress: Progress<'_>) -> R
 /// # Errors
 /// The same.
 pub fn run(scene: &Scene, options: &Options, progress: Progress<'_>) -> Result<Baked, BakeError> {
+    let play = &scene.playback;
+    let pixels = u64::from(play.width) * u64::from(play.height) * u64::from(play.frames);
+    if pixels > u64::from(u32::MAX) {
+        return Err(BakeError::Pixels(pixels));
+    }
     progress("building the hierarchy", 0.0);
     // Charts that the scene brings are as it wants them.
     let split = if chart::brings_own(scene) { None } else { scene::split(scene) };
@@ -288,7 +257,16 @@ fn choice(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Res
     }
 }
 
-/// Refuses a path that shows nothing but background.
-pub(crate) fn something_seen(flat: &Flat) -> Result<(), BakeError> {
-    if flat.atlas.gbuffer.label.iter().all(|&label| label == 0) { Err(BakeError::Nothing { rays: flat.rays }) } else { Ok(()) }
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::builtin;
+
+    #[test]
+    fn more_pixels_than_can_be_numbered_are_refused() {
+        let mut scene = builtin::build("pyramid").unwrap();
+        (scene.playback.width, scene.playback.height, scene.playback.frames) = (4096, 4096, 256);
+        let error = run(&scene, &Options::default(), &|_, _| {}).err();
+        assert_eq!(error, Some(BakeError::Pixels(1 << 32)));
+    }
 }

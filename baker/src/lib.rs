@@ -6,6 +6,7 @@
 mod around;
 pub mod atlas;
 pub mod bake;
+mod baked;
 pub mod bends;
 mod brinks;
 pub mod camera;
@@ -49,6 +50,7 @@ mod spare;
 pub mod straight;
 pub mod tears;
 pub mod terminal;
+pub mod throughput;
 pub mod timing;
 pub mod trace;
 pub mod truth;

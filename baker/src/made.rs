@@ -3,9 +3,9 @@
 use crate::bake::{self, BakeError, Encoded, Fitted, Flat, Settings};
 use crate::encode::image_bytes;
 use crate::metrics;
-use crate::report::grouped;
 use crate::scene::Scene;
 use crate::spare::DOUBLE;
+use crate::terminal::grouped;
 use crate::verify::{self, Brief};
 
 /// A bundle, what made it, and how good it is.
@@ -22,6 +22,17 @@ impl Made {
     /// Those of encoding, and of the player.
     pub fn new(scene: &Scene, flat: &Flat, settings: Settings) -> Result<Self, BakeError> {
         Self::of(scene, flat, &bake::fitted(scene, flat, &settings, &|_, _| {})?, settings)
+    }
+
+    /// Likewise; `None` where that is more than a bundle can hold.
+    ///
+    /// # Errors
+    /// The others.
+    pub fn tried(scene: &Scene, flat: &Flat, settings: Settings) -> Result<Option<Self>, BakeError> {
+        match Self::new(scene, flat, settings) {
+            Err(BakeError::Limit(_)) => Ok(None),
+            made => made.map(Some),
+        }
     }
 
     /// What the same make of sheets that are `fitted` already.
@@ -49,5 +60,21 @@ impl Made {
         let Self { encoded: Encoded { bundle, .. }, quality, .. } = self;
         let memory = verify::memory(bundle).map(grouped).unwrap_or_default();
         format!("{:.1} dB before repainting, in a bundle of {} B and {memory} B of memory", quality.psnr_mean, grouped(bundle.len()))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::builtin;
+
+    #[test]
+    fn what_no_bundle_holds_is_none() {
+        // In cells of 4 pixels 257 x 258 nodes with a layer each at least: more than 16 bits count.
+        let mut scene = builtin::build("pyramid").unwrap();
+        (scene.playback.width, scene.playback.height, scene.playback.frames) = (1024, 1028, 1);
+        let flat = bake::flatten(&scene, &crate::atlas::Settings::default(), &|_, _| {}).unwrap();
+        assert!(Made::tried(&scene, &flat, Settings { cell: 4, ..Settings::default() }).unwrap().is_none());
+        assert!(Made::tried(&scene, &flat, Settings { cell: 5, ..Settings::default() }).is_err(), "what else is wrong stays so");
     }
 }

@@ -12,11 +12,10 @@ use clap::{CommandFactory, Parser};
 use cli::{Bake, Cli, Command, Inspect, Playback, Throughput};
 use cubist_baker::inspect::Inspection;
 use cubist_baker::scene::Scene;
-use cubist_baker::terminal::{self, print, tell};
-use cubist_baker::{files, job, report, scene, trace};
+use cubist_baker::terminal::{self, aligned, grouped, print, tell};
+use cubist_baker::{files, job, report, scene, throughput};
 use indicatif::ProgressBar;
 use serde_json::json;
-use std::io::IsTerminal;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
@@ -111,7 +110,7 @@ fn inspect(args: &Inspect) -> Result<()> {
 fn throughput(args: &Throughput) -> Result<()> {
     threads(args.threads)?;
     let scene = load(&args.scene, &args.playback)?;
-    let figures = trace::throughput(&scene);
+    let figures = throughput::measured(&scene);
     let ratio = if figures.obvhs_alone > 0.0 { figures.ours / figures.obvhs_alone } else { 0.0 };
     if args.json {
         let document = json!({
@@ -127,8 +126,8 @@ fn throughput(args: &Throughput) -> Result<()> {
     }
     let row = |name: &str, value: String| (name.to_owned(), value);
     print(&aligned(&[
-        row("scene", format!("{}: {} triangles", scene.name, report::grouped(scene.triangles.len()))),
-        row("rays", format!("{} on {} threads", report::grouped(figures.rays as usize), rayon::current_num_threads())),
+        row("scene", format!("{}: {} triangles", scene.name, grouped(scene.triangles.len()))),
+        row("rays", format!("{} on {} threads", grouped(figures.rays as usize), rayon::current_num_threads())),
         row("G-buffer", format!("{:.2} million rays/s", figures.ours)),
         row("obvhs alone", format!("{:.2} million rays/s", figures.obvhs_alone)),
         row("ratio", format!("{:.1} %", 100.0 * ratio)),
@@ -155,14 +154,5 @@ fn threads(count: Option<u16>) -> Result<()> {
 
 /// A progress bar of a thousand steps a stage; hidden where nobody watches.
 fn bar(quiet: bool) -> ProgressBar {
-    if quiet || !std::io::stderr().is_terminal() {
-        return ProgressBar::hidden();
-    }
-    terminal::bar(1000, "{msg:26} [{wide_bar}] {elapsed}")
-}
-
-/// Rows of name and value, the values in one column.
-fn aligned(rows: &[(String, String)]) -> String {
-    let widest = rows.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
-    rows.iter().map(|(name, value)| format!("{name:widest$}  {value}\n")).collect()
+    if quiet { ProgressBar::hidden() } else { terminal::bar(1000, "{msg:26} [{wide_bar}] {elapsed}") }
 }

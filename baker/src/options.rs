@@ -8,6 +8,7 @@ use crate::chart::Choice;
 const WIDE: u32 = 640;
 /// and of 32: of smaller ones there are more than a bundle holds.
 const VAST: u32 = 2560;
+
 /// What the bundle is to reach.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Goal {

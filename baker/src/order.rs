@@ -3,7 +3,6 @@
 //! it less is better. Positions come from `fit`, fields from `fields`; the ordered lists go back to `settle`.
 
 use crate::atlas::SourceImage;
-use crate::bake::Coverage;
 use crate::fields::Fields;
 use crate::fit::Fit;
 use crate::gbuffer::GBuffer;
@@ -24,6 +23,18 @@ const PIXEL: u32 = 256;
 const PLAIN: u32 = 3 * 40 * 40;
 /// No pixel costs more than this many plainly wrong ones.
 const MOST: u32 = 4;
+
+/// The coverage tests that torn cells may use: all of them, or one alone to see what it is worth.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Coverage {
+    /// Charts, fields, and both at once, whichever tells best in each cell.
+    #[default]
+    All,
+    /// Charts alone: no fields are stored.
+    Chart,
+    /// Fields alone.
+    Field,
+}
 
 /// What the sheets are ordered by.
 pub struct Evidence<'a> {

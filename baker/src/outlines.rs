@@ -6,9 +6,9 @@ use crate::bake::{self, BakeError, Fitted, Flat, Progress};
 use crate::finer;
 use crate::made::Made;
 use crate::metrics;
-use crate::report::grouped;
 use crate::scene::Scene;
 use crate::spare::DOUBLE;
+use crate::terminal::grouped;
 use serde::{Deserialize, Serialize};
 
 /// One outline, tried.
@@ -86,8 +86,9 @@ pub fn reason(trials: &[Trial]) -> String {
 mod tests {
     use super::*;
     use crate::atlas;
-    use crate::bake::{Coverage, Settings};
+    use crate::bake::Settings;
     use crate::chart::Family;
+    use crate::order::Coverage;
     use crate::scene::builtin;
     use cubist_core::format::SPACE_LINEAR;
 

@@ -10,6 +10,7 @@ use crate::inspect::{Inspection, space_name, time_name};
 use crate::outlines;
 use crate::scene::Scene;
 use crate::straight;
+use crate::terminal::grouped;
 use crate::verify::{Quality, TruthQuality, Work};
 use cubist_core::format::{ATLAS, LABELS, MASK, SPACE_LINEAR, TexelKind};
 use serde::{Deserialize, Serialize};
@@ -372,20 +373,6 @@ fn warnings(origin: &Origin<'_>) -> Vec<String> {
     out
 }
 
-/// A number with its thousands apart: 12,345.
-#[must_use]
-pub fn grouped(number: usize) -> String {
-    let digits = number.to_string();
-    let mut out = String::with_capacity(digits.len() + digits.len() / 3);
-    for (at, digit) in digits.chars().enumerate() {
-        if at > 0 && (digits.len() - at).is_multiple_of(3) {
-            out.push(',');
-        }
-        out.push(digit);
-    }
-    out
-}
-
 /// The report as rows of name and value: bytes by section, quality, memory, seconds.
 #[must_use]
 pub fn table(report: &Report) -> Vec<(String, String)> {
@@ -493,12 +480,5 @@ mod tests {
         assert!(finer(8, 8).contains("--cell"));
         assert!(finer(4, 8).contains("--key-interval"));
         assert!(finer(4, 1).contains("--size"));
-    }
-
-    #[test]
-    fn thousands_stand_apart() {
-        for (number, text) in [(0, "0"), (999, "999"), (1000, "1,000"), (1_234_567, "1,234,567")] {
-            assert_eq!(grouped(number), text);
-        }
     }
 }

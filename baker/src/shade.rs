@@ -84,8 +84,8 @@ impl Pyramid {
         let (x, y) = (uv.x * l.width as f32 - 0.5, uv.y * l.height as f32 - 0.5);
         let (x0, y0) = (x.floor(), y.floor());
         let (fx, fy) = (x - x0, y - y0);
-        let xs = [0, 1].map(|d| wrapped(x0 as i64 + d, l.width, self.wrap[0]));
-        let ys = [0, 1].map(|d| wrapped(y0 as i64 + d, l.height, self.wrap[1]) * l.width as usize);
+        let xs = [0, 1].map(|d| wrapped((x0 as i64).saturating_add(d), l.width, self.wrap[0]));
+        let ys = [0, 1].map(|d| wrapped((y0 as i64).saturating_add(d), l.height, self.wrap[1]) * l.width as usize);
         let at = |y: usize, x: usize| l.texels.get(y + x).map_or(Vec4::ZERO, |t| Vec4::from(t.map(f32::from)));
         let top = at(ys[0], xs[0]).lerp(at(ys[0], xs[1]), fx);
         let bottom = at(ys[1], xs[0]).lerp(at(ys[1], xs[1]), fx);

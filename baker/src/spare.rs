@@ -3,17 +3,18 @@
 //! `bake` hands in how to code; the bundle of the best coarseness goes back.
 
 use crate::atlas::Atlas;
-use crate::climb::LAMBDAS;
 use crate::encode::CodingSettings;
 use crate::metrics;
 use crate::truth::spread;
 use crate::verify::{self, VerifyError};
 use rayon::prelude::*;
 
-/// What a bit is worth, finest first.
+/// What a bit is worth, finest first, where it hardly shows.
 const LAMBDAS_UP: [Coarser; 4] = [Coarser::Lambda(0.01), Coarser::Lambda(0.05), Coarser::Lambda(0.2), Coarser::Lambda(1.0)];
 /// Steps that positions are coded in after that: twice to eight times what they are stored in.
 const STEPS_UP: [Coarser; 3] = [Coarser::Step(1), Coarser::Step(2), Coarser::Step(3)];
+/// What a bit is worth, finest first, where a budget asks for it, and on the ladder that searches climb.
+pub(crate) const LAMBDAS: [f32; 5] = [0.01, 0.03, 0.1, 0.3, 1.0];
 /// Frames compared.
 const COMPARED: u32 = 16;
 /// What twice the bytes of a bundle's keys have to bring, dB against exact rays.

@@ -1,4 +1,4 @@
-//! What programs say: results on standard output, lines for people on standard error. Text comes from the programs.
+//! What programs say: results on standard output, lines for people on standard error; figures and tables as text. Text comes from the programs.
 
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -30,4 +30,43 @@ pub fn bar(length: u64, template: &str) -> ProgressBar {
     // Of two changes close behind each other only the first is drawn: a stage that says nothing for long would go by the name of the one before it.
     bar.enable_steady_tick(Duration::from_millis(100));
     bar
+}
+
+/// A number with its thousands apart: 12,345.
+#[must_use]
+pub fn grouped(number: usize) -> String {
+    let digits = number.to_string();
+    let mut out = String::with_capacity(digits.len() + digits.len() / 3);
+    for (at, digit) in digits.chars().enumerate() {
+        if at > 0 && (digits.len() - at).is_multiple_of(3) {
+            out.push(',');
+        }
+        out.push(digit);
+    }
+    out
+}
+
+/// Rows of name and value as lines of text, the values in one column.
+#[must_use]
+pub fn aligned(rows: &[(String, String)]) -> String {
+    let widest = rows.iter().map(|(name, _)| name.chars().count()).max().unwrap_or(0);
+    rows.iter().map(|(name, value)| format!("{name:widest$}  {value}\n")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn thousands_stand_apart() {
+        for (number, text) in [(0, "0"), (999, "999"), (1000, "1,000"), (1_234_567, "1,234,567")] {
+            assert_eq!(grouped(number), text);
+        }
+    }
+
+    #[test]
+    fn values_stand_in_one_column() {
+        let rows = [("a", "1"), ("long name", "2")].map(|(name, value)| (name.to_owned(), value.to_owned()));
+        assert_eq!(aligned(&rows), "a          1\nlong name  2\n");
+    }
 }

@@ -1,7 +1,6 @@
 //! Ray casting: the closest triangle along a ray, in double precision, without leaks between neighbours.
 //! Triangles come from a [`Scene`]; hits go to the G-buffer. The only file that names obvhs.
 
-use crate::gbuffer::{Hits, Lens};
 use crate::scene::Scene;
 use crate::shade::is_hole;
 use glam::{DVec3, Vec3A};
@@ -14,7 +13,7 @@ use obvhs::ray::{Ray, RayHit};
 use obvhs::{Boundable, BvhBuildParams};
 use rayon::prelude::*;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 /// How far outside a triangle, in barycentric units, a ray still counts as inside it: neighbours overlap by this much.
 const OVERLAP: f64 = 1e-9;
@@ -309,62 +308,40 @@ impl Packet {
     }
 }
 
-/// Rays per second, in millions, wall clock, on the current number of threads.
-#[derive(Clone, Copy, Debug)]
-pub struct Throughput {
-    /// Rays cast for one measurement.
-    pub rays: u64,
-    /// The G-buffer stage as it is.
-    pub ours: f64,
-    /// obvhs with its own single-precision triangle test on the same rays, made beforehand.
-    pub obvhs_alone: f64,
+/// obvhs alone, with its own single-precision triangle test, and rays made beforehand: what ray casting is measured against.
+pub(crate) struct Bare {
+    boxes: Bvh2,
+    triangles: Vec<obvhs::triangle::Triangle>,
+    rays: Vec<Ray>,
+    found: Vec<RayHit>,
 }
 
-/// Measures the G-buffer stage against obvhs alone on at most 8 frames of the scene; the best of three runs each.
-pub fn throughput(scene: &Scene) -> Throughput {
-    let frames = scene.playback.frames.min(8);
-    let (width, height) = (scene.playback.width, scene.playback.height);
-    let mut part = scene.clone();
-    part.playback.frames = frames;
-    let tracer = Tracer::new(&part);
-    let (centre, _) = extent(&part);
-    let triangles: Vec<obvhs::triangle::Triangle> = part
-        .triangles
-        .iter()
-        .map(|t| t.position.map(|p| (p - centre).as_vec3a()))
-        .map(|[v0, v1, v2]| obvhs::triangle::Triangle { v0, v1, v2 })
-        .collect();
-    let rays: Vec<Ray> = (0..frames)
-        .flat_map(|f| {
-            let lens = Lens::new(&part, f);
-            (0..height).flat_map(move |y| (0..width).map(move |x| (lens.eye, lens.direction(f64::from(x) + 0.5, f64::from(y) + 0.5))))
-        })
-        .map(|(eye, direction)| Ray::new_inf((eye - centre).as_vec3a(), direction.as_vec3a()))
-        .collect();
-    let count = rays.len() as u64;
-    let rate = |time: Duration| count as f64 / time.as_secs_f64().max(1e-9) / 1e6;
-    let (mut ours, mut alone) = (0.0f64, 0.0f64);
-    if triangles.is_empty() || rays.is_empty() {
-        return Throughput { rays: count, ours, obvhs_alone: alone };
+impl Bare {
+    /// The triangles of `scene`, and `rays` by their origins and directions; `None` where there are none of either.
+    pub fn new(scene: &Scene, rays: impl Iterator<Item = (DVec3, DVec3)>) -> Option<Self> {
+        let (centre, _) = extent(scene);
+        let corners = scene.triangles.iter().map(|t| t.position.map(|p| (p - centre).as_vec3a()));
+        let triangles: Vec<obvhs::triangle::Triangle> = corners.map(|[v0, v1, v2]| obvhs::triangle::Triangle { v0, v1, v2 }).collect();
+        let rays: Vec<Ray> = rays.map(|(origin, direction)| Ray::new_inf((origin - centre).as_vec3a(), direction.as_vec3a())).collect();
+        if triangles.is_empty() || rays.is_empty() {
+            return None;
+        }
+        let boxes = build(&triangles);
+        let triangles = boxes.primitive_indices.iter().map(|&i| triangles[i as usize]).collect();
+        let found = vec![RayHit::none(); rays.len()];
+        Some(Self { boxes, triangles, rays, found })
     }
-    let hierarchy = build(&triangles);
-    let ordered: Vec<_> = hierarchy.primitive_indices.iter().map(|&i| triangles[i as usize]).collect();
-    let mut found = vec![RayHit::none(); rays.len()];
-    for _ in 0..3 {
-        let start = Instant::now();
-        let hits = Hits::cast(&part, &tracer, &|_, _| {});
-        ours = ours.max(rate(start.elapsed()));
-        assert_eq!(hits.samples.len(), rays.len());
-        let start = Instant::now();
-        found.par_chunks_mut(width as usize).zip(rays.par_chunks(width as usize)).for_each(|(found, rays)| {
+
+    /// Casts them all, so many side by side on one thread.
+    pub fn cast(&mut self, run: usize) {
+        let Self { boxes, triangles, rays, found } = self;
+        found.par_chunks_mut(run).zip(rays.par_chunks(run)).for_each(|(found, rays)| {
             for (found, ray) in found.iter_mut().zip(rays) {
                 *found = RayHit::none();
-                hierarchy.ray_traverse(*ray, found, |ray, i| ordered[i].intersect(ray));
+                boxes.ray_traverse(*ray, found, |ray, i| triangles[i].intersect(ray));
             }
         });
-        alone = alone.max(rate(start.elapsed()));
     }
-    Throughput { rays: count, ours, obvhs_alone: alone }
 }
 
 #[cfg(test)]

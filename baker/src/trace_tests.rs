@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::camera::{Path, Pose};
+use crate::gbuffer::{Hits, Lens};
 use crate::scene::{Background, Material, Playback, Texture, Triangle, Wrap};
 use glam::{Vec2, Vec3};
 use std::sync::Arc;

@@ -7,13 +7,12 @@ use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings, Sparing};
 use crate::cast::Cast;
 use crate::climb::{Free, Step, Take, climb};
 use crate::encode::image_bytes;
-use crate::job::{self, Chosen, Whole};
 use crate::metrics;
 use crate::options::{Goal, Options};
 use crate::repaint::Painter;
-use crate::report::grouped;
 use crate::samples::Samples;
 use crate::scene::Scene;
+use crate::terminal::grouped;
 use crate::verify;
 use std::time::Instant;
 
@@ -40,6 +39,28 @@ const REACHED: f64 = 1e12;
 pub(crate) const MOST_MEMORY: usize = 128 << 10;
 /// How far a predicted size may lie over the budget and still be tried: coarser keys take less.
 const SLACK: f64 = 1.15;
+
+/// What was chosen: by the settings or by a search.
+pub(crate) struct Chosen {
+    pub flat: Flat,
+    pub encoded: Encoded,
+    pub settings: Settings,
+    /// Seconds for what was tried and not kept.
+    pub search_seconds: f64,
+    /// What the user should know about the choice.
+    pub warnings: Vec<String>,
+    /// Whether the search leaves room for what is baked where nothing is asked for: how that has to be stored.
+    pub contested: Option<Storage>,
+}
+
+/// A bundle that needs more memory than there is.
+#[derive(Clone, Copy)]
+pub(crate) struct Whole {
+    pub settings: Settings,
+    pub memory: usize,
+    /// Mean PSNR against exact rays before texels are coloured by what is played, dB.
+    pub psnr: f64,
+}
 
 /// Searches for `goal`, with colours by `painter`, if any. `whole`: what is too large for a [`Goal::Ram`], where there is such a bundle.
 ///
@@ -128,7 +149,7 @@ impl Search<'_> {
     /// The source image that `source` asks for, and what goes with it.
     pub(crate) fn flat(&self, source: atlas::Settings) -> Result<Flat, BakeError> {
         let flat = bake::flatten_cast(self.cast, &source, &|_, _| {})?;
-        job::something_seen(&flat)?;
+        bake::something_seen(&flat)?;
         Ok(flat)
     }
 

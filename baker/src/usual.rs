@@ -3,7 +3,7 @@
 
 use crate::atlas::Storage;
 use crate::bake::BakeError;
-use crate::job::Baked;
+use crate::baked::Baked;
 use crate::options::{Goal, Options};
 use crate::seen::Seen;
 use crate::tune::MOST_MEMORY;

@@ -1,9 +1,9 @@
 //! From a G-buffer to bytes to pixels: two sheets, one moving in front of the other.
 
 use cubist_baker::atlas::{Label, Outline, SourceImage, Storage};
-use cubist_baker::bake::Coverage;
 use cubist_baker::encode::{self, CodingSettings, Content, Exceeded, Header};
 use cubist_baker::gbuffer::GBuffer;
+use cubist_baker::order::Coverage;
 use cubist_baker::sheets::{self, KeyGrid, Layers};
 use cubist_baker::{fields, fit, order, settle};
 use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC, TIME_HOLD, TIME_LINEAR, TexelKind};

@@ -1,5 +1,5 @@
 //! The keys: which does what, for the window and for its help.
-//! winit keys come in from `window`; actions go to `show`, the same table as text to `overlay`.
+//! winit keys come in from `window`; actions go to `stage`, the same table as text to `overlay`.
 
 use winit::keyboard::{Key, NamedKey};
 

@@ -26,7 +26,7 @@ use anyhow::Result;
 use clap::Parser;
 use cli::{Cli, Command, Show, Usage};
 use cubist_baker::files::clean_up_when_interrupted;
-use cubist_baker::terminal::{print, tell};
+use cubist_baker::terminal::{aligned, print, tell};
 use cubist_core::Bundle;
 use input::Loaded;
 use picture::Player;
@@ -72,7 +72,7 @@ fn show(args: &Show) -> Result<()> {
         });
         let mut rows = measure::facts(loaded, bundle);
         rows.extend(loaded.rows.iter().cloned());
-        print(&(measure::table(&rows) + "\n"))?;
+        print(&aligned(&rows))?;
         if events.is_none() && args.shot.is_none() {
             return headless::pictures(&mut player, &args.out, args.frames, args.scale.unwrap_or(1));
         }

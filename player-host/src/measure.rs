@@ -2,11 +2,10 @@
 //! A bundle comes in and is played once from end to end; a table or one JSON document goes out.
 
 use crate::input::Loaded;
-use crate::overlay::grouped;
 use crate::picture::{Picture, Player};
 use crate::progress::progress;
 use anyhow::Result;
-use cubist_baker::terminal::print;
+use cubist_baker::terminal::{aligned, grouped, print};
 use cubist_core::format::{ATLAS, Section};
 use cubist_core::{Bundle, Frame, Work};
 use serde_json::{Value, json};
@@ -64,7 +63,7 @@ pub fn run(loaded: &Loaded, bundle: &Bundle<'_>, player: &mut Player<'_>, as_jso
         return print(&(serde_json::to_string_pretty(&document(loaded, bundle, &spreads, seconds))? + "\n"));
     }
     let mut rows = facts(loaded, bundle);
-    rows.extend(bundle.sections().map(|s| (format!("section {}", tag(&s)), format!("{} bytes", grouped(s.bytes.len() as u64)))));
+    rows.extend(bundle.sections().map(|s| (format!("section {}", tag(&s)), format!("{} bytes", grouped(s.bytes.len())))));
     rows.push((
         "keys".to_owned(),
         format!(
@@ -81,11 +80,11 @@ pub fn run(loaded: &Loaded, bundle: &Bundle<'_>, player: &mut Player<'_>, as_jso
     for ((name, _), spread) in COUNTERS.iter().zip(spreads) {
         rows.push((
             format!("{} a frame", name.replace('_', " ")),
-            format!("mean {:.1}, max {}", spread.mean(frames), grouped(spread.max.into())),
+            format!("mean {:.1}, max {}", spread.mean(frames), grouped(spread.max as usize)),
         ));
     }
     rows.push(("keys a seek".to_owned(), format!("at most {}", bundle.limits().seek_keys)));
-    print(&(table(&rows) + "\n"))
+    print(&aligned(&rows))
 }
 
 /// What is known of a bundle before it plays, as rows of a table.
@@ -93,28 +92,22 @@ pub fn facts(loaded: &Loaded, bundle: &Bundle<'_>) -> Vec<(String, String)> {
     let (width, height) = bundle.size();
     let frames = bundle.frames();
     let end = if bundle.looping() { "looping" } else { "not looping" };
-    let size = loaded.bytes.len() as u64;
+    let size = loaded.bytes.len();
     let row = |name: &str, value: String| (name.to_owned(), value);
     vec![
         row("bundle", loaded.name.clone()),
         row("pictures", format!("{frames} of {width} x {height}, {} frames/s, {end}", bundle.fps())),
         row("bundle size", format!("{} bytes", grouped(size))),
         row("per frame", format!("{:.1} bytes", size as f64 / f64::from(frames.max(1)))),
-        row("working memory", format!("{} bytes + a row of {}", grouped(bundle.memory_needed() as u64), grouped(u64::from(width) * 2))),
+        row("working memory", format!("{} bytes + a row of {}", grouped(bundle.memory_needed()), grouped(width as usize * 2))),
     ]
-}
-
-/// Rows of name and value as text, the values in one column.
-pub fn table(rows: &[(String, String)]) -> String {
-    let widest = rows.iter().map(|r| r.0.chars().count()).max().unwrap_or(0);
-    rows.iter().map(|(name, value)| format!("{name:widest$}  {value}")).collect::<Vec<_>>().join("\n")
 }
 
 fn document(loaded: &Loaded, bundle: &Bundle<'_>, spreads: &[Spread], seconds: f64) -> Value {
     let (width, height) = bundle.size();
     let frames = bundle.frames();
-    let per_frame = |bytes: u64| bytes as f64 / f64::from(frames);
-    let size = loaded.bytes.len() as u64;
+    let per_frame = |bytes: usize| bytes as f64 / f64::from(frames);
+    let size = loaded.bytes.len();
     let work = COUNTERS.iter().zip(spreads).map(|((name, _), s)| ((*name).to_owned(), json!({ "mean": s.mean(frames), "max": s.max })));
     let sections: Vec<Value> =
         bundle.sections().map(|s| json!({ "tag": tag(&s), "required": s.required, "bytes": s.bytes.len() })).collect();
@@ -142,8 +135,8 @@ fn document(loaded: &Loaded, bundle: &Bundle<'_>, spreads: &[Spread], seconds: f
 }
 
 /// Bytes of the key records and their table.
-fn key_bytes(bundle: &Bundle<'_>) -> u64 {
-    bundle.path().key_bytes() as u64
+fn key_bytes(bundle: &Bundle<'_>) -> usize {
+    bundle.path().key_bytes()
 }
 
 fn tag(section: &Section<'_>) -> String {
@@ -159,11 +152,5 @@ mod tests {
         let mut spread = Spread::default();
         [1, 2, 6].into_iter().for_each(|count| spread.add(count));
         assert_eq!((spread.mean(3), spread.max), (3.0, 6));
-    }
-
-    #[test]
-    fn tables_align_their_values() {
-        let rows = [("a".to_owned(), "1".to_owned()), ("long name".to_owned(), "2".to_owned())];
-        assert_eq!(table(&rows), "a          1\nlong name  2");
     }
 }

@@ -1,10 +1,11 @@
 //! The overlay: where the picture goes, and the strip below it with timeline and figures.
-//! The window's size and the state of play come in from `show`; shapes and letters go to `canvas`.
+//! The window's size and the state of play come in from `stage`; shapes and letters go to `canvas`.
 
 use crate::canvas::{Area, Canvas, Colour};
 use crate::keys::HELP;
 use crate::text::Face;
 use crate::transport::Ends;
+use cubist_baker::terminal::grouped;
 use cubist_core::Work;
 
 const STRIP: Colour = Colour([24, 27, 33, 255]);
@@ -62,26 +63,13 @@ impl Status {
             format!("{state} {:>digits$}/{} {shown:>5}/{} fps {speed:<4} {ends}", self.frame, self.frames, self.fps),
             format!(
                 "{} B, {} B/frame, memory {} B",
-                grouped(self.bundle_bytes as u64),
-                grouped(self.bundle_bytes as u64 / u64::from(self.frames.max(1))),
-                grouped(self.memory as u64)
+                grouped(self.bundle_bytes),
+                grouped(self.bundle_bytes / self.frames.max(1) as usize),
+                grouped(self.memory)
             ),
-            format!("keys {:>2}  layers {:>6}  torn {torn:>5.1} %", self.work.keys, grouped(self.work.layers.into())),
+            format!("keys {:>2}  layers {:>6}  torn {torn:>5.1} %", self.work.keys, grouped(self.work.layers as usize)),
         ]
     }
-}
-
-/// A number with a comma between thousands.
-pub fn grouped(number: u64) -> String {
-    let digits = number.to_string();
-    let mut text = String::new();
-    for (i, digit) in digits.chars().enumerate() {
-        if i > 0 && (digits.len() - i).is_multiple_of(3) {
-            text.push(',');
-        }
-        text.push(digit);
-    }
-    text
 }
 
 fn speed_text(eighths: u16) -> String {
@@ -231,7 +219,6 @@ mod tests {
         assert_eq!(bytes, "91,234 B, 11,404 B/frame, memory 14,336 B");
         assert_eq!(work, "keys  2  layers  1,234  torn  10.0 %");
         assert_eq!([1, 2, 4, 8, 64].map(speed_text), ["x1/8", "x1/4", "x1/2", "x1", "x8"]);
-        assert_eq!([0, 999, 1000, 1_234_567].map(grouped), ["0", "999", "1,000", "1,234,567"]);
     }
 
     #[test]

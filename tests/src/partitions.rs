@@ -162,7 +162,8 @@ pub fn perfect(bytes: &[u8], atlas: &Atlas) -> Result<Score> {
 mod tests {
     use super::*;
     use crate::{figures, scenes};
-    use cubist_baker::bake::{self, Coverage, Settings};
+    use cubist_baker::bake::{self, Settings};
+    use cubist_baker::order::Coverage;
 
     #[test]
     fn better_partitions_play_better() {

@@ -3,9 +3,9 @@
 
 use anyhow::Result;
 use cubist_baker::atlas::{Label, Outline, SourceImage, Storage};
-use cubist_baker::bake::Coverage;
 use cubist_baker::encode::{self, CodingSettings, Content, Header};
 use cubist_baker::gbuffer::GBuffer;
+use cubist_baker::order::Coverage;
 use cubist_baker::sheets::{self, KeyGrid, Layers};
 use cubist_baker::{fit, order, settle};
 use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC, TexelKind};

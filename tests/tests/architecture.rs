@@ -4,7 +4,7 @@
 mod source;
 
 use source::Source;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// The core's modules from the bottom up: each may use those before it, none after it.
 const ORDER: [&str; 37] = [
@@ -216,6 +216,30 @@ fn the_core_imports_downwards() {
     }
     none(found);
     assert_eq!(reexports.get("Bundle").map(String::as_str), Some("bundle"), "the re-exports are read as they should be");
+}
+
+/// Modules are files beside `lib.rs`, and folders.
+#[test]
+fn the_baker_imports_in_no_circle() {
+    let mut imports: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for source in source::below("baker/src/") {
+        let name = source.path["baker/src/".len()..].trim_end_matches(".rs").split('/').next().unwrap_or("").to_owned();
+        if !matches!(name.as_str(), "lib" | "main") {
+            let named = imports.entry(name.clone()).or_default();
+            named.extend(source::imports(&source.code_without_tests()).into_iter().filter(|other| *other != name));
+        }
+    }
+    assert!(imports["job"].contains("bake") && imports["bake"].contains("gbuffer"), "the imports are read as they should be");
+    // What imports nothing that is left is in no circle.
+    let leaf = |left: &BTreeMap<String, BTreeSet<String>>| {
+        left.iter().find(|(_, named)| named.iter().all(|name| !left.contains_key(name))).map(|(name, _)| name.clone())
+    };
+    while let Some(name) = leaf(&imports) {
+        imports.remove(&name);
+    }
+    // What imports one is left, too: only what is imported by another of them.
+    let circle = imports.keys().filter(|name| imports.values().any(|named| named.contains(*name)));
+    none(circle.map(|name| format!("baker/src/{name}: imports what imports it: {:?}", imports[name])).collect());
 }
 
 #[test]

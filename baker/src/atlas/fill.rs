@@ -2,7 +2,7 @@
 //! Places come from the packing, colours from [`Shader`]; the coloured image goes to the palette.
 
 use super::Seen;
-use super::footprint::{fine, members};
+use super::footprint::fine;
 use super::grid::Grid;
 use super::pack::Layout;
 use super::place::Place;
@@ -44,7 +44,8 @@ struct Reference {
 
 /// Colours all charts and the background, and continues them into the gutters.
 pub(super) fn fill(scene: &Scene, shader: &Shader<'_>, hits: &Hits, charting: &Charting, layout: &Layout, seen: &Seen) -> Filled {
-    let patches: Vec<Vec<Option<Vec3>>> = members(charting)
+    let patches: Vec<Vec<Option<Vec3>>> = charting
+        .members()
         .par_iter()
         .enumerate()
         .map(|(c, faces)| Patch { scene, shader, hits, charting, layout, seen, chart: c, place: layout.places[c] }.colour(faces))

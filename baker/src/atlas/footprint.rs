@@ -26,15 +26,6 @@ pub(super) struct Footprints<'a> {
     members: Vec<Vec<u32>>,
 }
 
-/// The faces of each chart.
-pub(super) fn members(charting: &Charting) -> Vec<Vec<u32>> {
-    let mut members: Vec<Vec<u32>> = vec![Vec::new(); charting.charts.len()];
-    for (face, &chart) in charting.chart_of.iter().enumerate() {
-        members[chart as usize].push(face as u32);
-    }
-    members
-}
-
 /// Colour samples a texel of a chart has in each direction: one where texels are copied.
 pub(super) fn fine(projection: &Projection, scale: f64) -> u32 {
     if matches!(projection, Projection::Texture) && scale >= 1.0 { 1 } else { 2 }
@@ -42,7 +33,7 @@ pub(super) fn fine(projection: &Projection, scale: f64) -> u32 {
 
 impl<'a> Footprints<'a> {
     pub fn new(scene: &'a Scene, hits: &'a Hits, charting: &'a Charting) -> Self {
-        Self { scene, hits, charting, members: members(charting) }
+        Self { scene, hits, charting, members: charting.members() }
     }
 
     /// The place of a chart on its own.

@@ -1,7 +1,6 @@
 //! Outlines: what of the image belongs to a chart, in bits of a texel's size, or of a half or a quarter of it.
 //! Places come from the packing, pixels from the G-buffer; the player's chart test asks it, and outlines thinner than a texel want finer bits than texels.
 
-use super::footprint::members;
 use super::grid::Grid;
 use super::pack::Layout;
 use crate::chart::Charting;
@@ -89,7 +88,7 @@ pub(super) fn outline(
         }
         drawn
     };
-    let drawn: Vec<Vec<usize>> = members(charting).par_iter().enumerate().map(drawn).collect();
+    let drawn: Vec<Vec<usize>> = charting.members().par_iter().enumerate().map(drawn).collect();
     let mut bits = vec![false; covered.len() << (2 * finer)];
     drawn.into_iter().flatten().for_each(|bit| bits[bit] = true);
     // What is too thin for any bit's middle is where pixels fall on it.

@@ -100,14 +100,7 @@ fn grids(charting: &Charting) -> Vec<Grid> {
 /// Every texel every face shows, in the order of the faces. Faces of flat charts are left out.
 fn touches(hits: &Hits, charting: &Charting) -> Vec<Touch> {
     let grids = grids(charting);
-    let mut range = vec![(f64::INFINITY, f64::NEG_INFINITY); grids.len()];
-    for (corners, &c) in charting.corners.iter().zip(&charting.chart_of) {
-        let range = &mut range[c as usize];
-        for corner in corners {
-            *range = (range.0.min(corner[2]), range.1.max(corner[2]));
-        }
-    }
-    let flat: Vec<bool> = range.iter().zip(&grids).map(|(r, g)| r.1 - r.0 < 2.0 / g.density).collect();
+    let flat: Vec<bool> = charting.deep().iter().zip(&grids).map(|(deep, g)| *deep < 2.0 / g.density).collect();
     let frame_size = ((hits.width * hits.height) as usize).max(1);
     let parts: Vec<Vec<Touch>> = hits
         .samples

@@ -38,6 +38,9 @@ pub(crate) use warp::rewarp;
 /// Not a face, not a chart.
 pub(crate) const NONE: u32 = u32::MAX;
 
+/// Charts are flat up to this depth, texels. Playback tells positions on those from the camera, unless they are warped.
+const FLAT: f64 = 0.5;
+
 /// What takes the place of depth where there is no projection: two surfaces that lie on each other in a texture are seldom level in it.
 const OBLIQUE: DVec3 = DVec3::new(0.48, 0.64, 0.6);
 
@@ -143,7 +146,7 @@ impl Charting {
     }
 
     /// The faces of each chart.
-    fn members(&self) -> Vec<Vec<u32>> {
+    pub(crate) fn members(&self) -> Vec<Vec<u32>> {
         let mut members = vec![Vec::new(); self.charts.len()];
         for (face, &chart) in self.chart_of.iter().enumerate() {
             members[chart as usize].push(face as u32);
@@ -168,18 +171,14 @@ impl Charting {
     /// middles lie on. Returns what was before; `None`, and nothing is done, where one side would have none.
     pub(crate) fn sever(&mut self, hits: &Hits, chart: usize, (axis, value): (usize, f64)) -> Option<Parts> {
         let beyond = |corners: &[[f64; 4]; 3]| corners.iter().map(|corner| corner[axis] / corner[3]).sum::<f64>() >= 3.0 * value;
-        let sides = || self.chart_of.iter().zip(&self.corners).filter(|(of, _)| **of == chart as u32).map(|(_, corners)| beyond(corners));
-        if sides().all(|side| side) || !sides().any(|side| side) {
+        let own = (0u32..).zip(&self.chart_of).filter(|(_, of)| **of == chart as u32);
+        let faces: Vec<u32> = own.map(|(face, _)| face).collect();
+        let far: Vec<u32> = faces.iter().copied().filter(|&face| beyond(&self.corners[face as usize])).collect();
+        if far.is_empty() || far.len() == faces.len() {
             return None;
         }
         let before = Parts { chart_of: self.chart_of.clone(), charts: self.charts.clone() };
-        let other = self.charts.len() as u32;
-        self.charts.push(self.charts[chart].clone());
-        for (of, corners) in self.chart_of.iter_mut().zip(&self.corners) {
-            if *of == chart as u32 && beyond(corners) {
-                *of = other;
-            }
-        }
+        self.take_out(chart as u32, &far);
         measure::bound(hits, self);
         Some(before)
     }
@@ -187,6 +186,16 @@ impl Charting {
     /// Shares the faces out like this: takes back a cut, or makes it again. Returns how they were shared out.
     pub(crate) fn exchange(&mut self, Parts { chart_of, charts }: Parts) -> Parts {
         Parts { chart_of: mem::replace(&mut self.chart_of, chart_of), charts: mem::replace(&mut self.charts, charts) }
+    }
+
+    /// How far the faces of each chart reach in depth, flattened units; below zero where it has none.
+    fn deep(&self) -> Vec<f64> {
+        let mut range = vec![(f64::INFINITY, f64::NEG_INFINITY); self.charts.len()];
+        for (corners, &chart) in self.corners.iter().zip(&self.chart_of) {
+            let range = &mut range[chart as usize];
+            *range = corners.iter().fold(*range, |range, corner| (range.0.min(corner[2]), range.1.max(corner[2])));
+        }
+        range.into_iter().map(|(low, high)| high - low).collect()
     }
 
     /// The mean distance of each cluster from its view's eye.

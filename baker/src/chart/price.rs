@@ -1,7 +1,7 @@
 //! Prices: what the charts of a scene are likely to cost, told without coding them.
 //! Charts come measured; the price decides between candidates.
 
-use super::{Charting, NONE};
+use super::{Charting, FLAT, NONE};
 use crate::gbuffer::{BACKGROUND, Hits};
 use rayon::prelude::*;
 
@@ -9,8 +9,6 @@ use rayon::prelude::*;
 const BLOCK: usize = 8;
 /// A chart seen in fewer pixels of a block does not count.
 const LEAST: u32 = 8;
-/// Charts are flat up to this depth, texels.
-const FLAT: f64 = 0.5;
 
 /// Bytes that a chart takes in a block of its own and in a torn one: flat, then not flat. Fitted to bundles; positions on flat charts are
 /// all but told by the camera.
@@ -52,10 +50,5 @@ pub(crate) fn price(hits: &Hits, charting: &Charting) -> f64 {
 
 /// Which charts are not flat.
 fn bent(charting: &Charting) -> Vec<bool> {
-    let mut range = vec![(f64::INFINITY, f64::NEG_INFINITY); charting.charts.len()];
-    for (corners, &c) in charting.corners.iter().zip(&charting.chart_of) {
-        let range = &mut range[c as usize];
-        *range = corners.iter().fold(*range, |r, corner| (r.0.min(corner[2]), r.1.max(corner[2])));
-    }
-    range.iter().zip(&charting.charts).map(|(r, chart)| (r.1 - r.0) * chart.density > FLAT).collect()
+    charting.deep().iter().zip(&charting.charts).map(|(deep, chart)| deep * chart.density > FLAT).collect()
 }

@@ -1,7 +1,7 @@
 //! Warps: inside a chart, texels move to where its detail is seen, along its two directions apart from each other.
 //! Finished charts and samples come in; the atlas asks [`Charting::flat`] for warped coordinates, and [`Warp`] for the way back.
 
-use super::{Chart, Charting, NONE, Projection};
+use super::{Chart, Charting, FLAT, NONE, Projection};
 use crate::gbuffer::{BACKGROUND, Hits};
 use rayon::prelude::*;
 
@@ -79,8 +79,6 @@ const UNEVEN: f64 = 1.0;
 const SMALL: f64 = 1000.0 / 9.8e6;
 /// Octaves by which slopes differ from what they were, at most.
 const MOST: f64 = 4.0;
-/// Charts are flat up to this depth, texels. Playback tells positions on those from the camera, unless they are bent.
-const FLAT: f64 = 0.5;
 
 /// What is seen of the pieces of both directions: how many pixels ask for how many texels a flattened length.
 type Demand = [[[u32; BINS]; PIECES]; 2];
@@ -89,15 +87,10 @@ type Demand = [[[u32; BINS]; PIECES]; 2];
 /// ask for about the same all along, are only stretched.
 pub(crate) fn rewarp(hits: &Hits, charting: &mut Charting) {
     let demands = demands(hits, charting);
-    let mut depth = vec![(f64::INFINITY, f64::NEG_INFINITY); charting.charts.len()];
-    for (corners, &c) in charting.corners.iter().zip(&charting.chart_of) {
-        let range = &mut depth[c as usize];
-        *range = corners.iter().fold(*range, |r, corner| (r.0.min(corner[2]), r.1.max(corner[2])));
-    }
-    let of = |chart: &mut Chart, demand: Option<&Demand>, (low, high): (f64, f64)| {
+    let of = |chart: &mut Chart, demand: Option<&Demand>, deep: f64| {
         let copied = matches!(chart.projection, Projection::Texture);
         let demand = demand.filter(|_| !copied && (0..2).all(|k| chart.hi[k] - chart.lo[k] > 0.0))?;
-        let flat = (high - low) * chart.density < FLAT;
+        let flat = deep * chart.density < FLAT;
         let mut slopes = [0, 1].map(|k| slopes(&demand[k], flat));
         let mean = |s: &[f64; PIECES + 1]| (1..=PIECES).map(|i| 0.5 * (s[i - 1] + s[i])).sum::<f64>() / PIECES as f64;
         let less = 1.0 / (mean(&slopes[0]) * mean(&slopes[1])).max(1.0).sqrt();
@@ -108,8 +101,9 @@ pub(crate) fn rewarp(hits: &Hits, charting: &mut Charting) {
         }
         Some(warp)
     };
+    let deep = charting.deep();
     charting.warps =
-        charting.charts.iter_mut().zip(&demands).zip(depth).map(|((c, demand), depth)| of(c, demand.as_deref(), depth)).collect();
+        charting.charts.iter_mut().zip(&demands).zip(deep).map(|((chart, demand), deep)| of(chart, demand.as_deref(), deep)).collect();
 }
 
 /// The slopes at the knots of a direction: how many times as dense as the chart each piece has to be.

@@ -4,7 +4,7 @@
 use super::error::{SceneError, Warnings};
 use super::keys::{CameraTable, File, HeightTable, LightTable, Source};
 use super::load::{self, BACKGROUND, FOV, MAX_FPS, MAX_FRAMES, MAX_SCREEN, MODELS_TOLD, Overrides, PLAYBACK};
-use super::model::{Model, shared};
+use super::model::Model;
 use super::up::Along;
 use super::{Background, Light, Playback, Scene, Triangle, Wrap, heightfield, picture};
 use crate::camera::{self, Aim, Line, Orbit, Pivot, Spline};
@@ -33,10 +33,10 @@ pub(crate) fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneErr
             Some(path) => path,
             None => {
                 let fov = table.fov.unwrap_or(FOV);
-                shared(load::turntable(&model, &playback, fov, table.up.map_or(DVec3::Y, DVec3::from_array)))
+                Arc::new(load::turntable(&model, &playback, fov, table.up.map_or(DVec3::Y, DVec3::from_array)))
             }
         },
-        None => shared(load::turntable(&model, &playback, FOV, DVec3::Y)),
+        None => Arc::new(load::turntable(&model, &playback, FOV, DVec3::Y)),
     };
     if file.camera.as_ref().is_some_and(|c| c.gltf.is_some() && c.up.is_some()) {
         model.warnings.add("camera.up is ignored: the model's camera has its own");
@@ -237,7 +237,7 @@ fn path_of(source: &Source<'_>, table: &CameraTable, fov: f64, model: Option<&Mo
         }
         angles(source, "camera.orbit", &t.azimuth, &t.elevation)?;
         let target = point("orbit.target", &t.target)?;
-        return Ok(Some(shared(Orbit { target, radius: t.radius, azimuth: t.azimuth, elevation: t.elevation, up, fov })));
+        return Ok(Some(Arc::new(Orbit { target, radius: t.radius, azimuth: t.azimuth, elevation: t.elevation, up, fov })));
     }
     if let Some(t) = &table.line {
         let aim = match (&t.look, &t.look_at) {
@@ -252,7 +252,7 @@ fn path_of(source: &Source<'_>, table: &CameraTable, fov: f64, model: Option<&Mo
             return Err(source.error("camera.line.look", "found [0, 0, 0]; expected a direction, such as [0, 0, -1]"));
         }
         let (from, to) = (point("line.from", &t.from)?, point("line.to", &t.to)?);
-        return Ok(Some(shared(Line { from, to, aim, up, fov })));
+        return Ok(Some(Arc::new(Line { from, to, aim, up, fov })));
     }
     if let Some(t) = &table.spline {
         if t.points.len() < 2 {
@@ -263,11 +263,11 @@ fn path_of(source: &Source<'_>, table: &CameraTable, fov: f64, model: Option<&Mo
         }
         let points = t.points.iter().map(|p| point("spline.points", p)).collect::<Result<_, _>>()?;
         let look_at = t.look_at.iter().map(|p| point("spline.look_at", p)).collect::<Result<_, _>>()?;
-        return Ok(Some(shared(Spline { points, look_at, up, fov })));
+        return Ok(Some(Arc::new(Spline { points, look_at, up, fov })));
     }
     if let Some(t) = &table.pivot {
         angles(source, "camera.pivot", &t.azimuth, &t.elevation)?;
-        return Ok(Some(shared(Pivot { eye: point("pivot.eye", &t.eye)?, azimuth: t.azimuth, elevation: t.elevation, up, fov })));
+        return Ok(Some(Arc::new(Pivot { eye: point("pivot.eye", &t.eye)?, azimuth: t.azimuth, elevation: t.elevation, up, fov })));
     }
     if let Some(name) = &table.gltf {
         let Some(model) = model else {
@@ -275,7 +275,7 @@ fn path_of(source: &Source<'_>, table: &CameraTable, fov: f64, model: Option<&Mo
         };
         let mut path = model.camera(name).map_err(|what| source.error("camera.gltf", what))?;
         path.fov = table.fov.unwrap_or(path.fov);
-        return Ok(Some(shared(Along { path, up: model.up })));
+        return Ok(Some(Arc::new(Along { path, up: model.up })));
     }
     Ok(None)
 }

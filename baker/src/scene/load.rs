@@ -2,12 +2,13 @@
 //! Called by the programs; calls the loader the ending asks for.
 
 use super::error::nearest;
-use super::model::{Model, bounding_sphere, shared};
+use super::model::{Model, bounding_sphere};
 use super::{Background, Light, Playback, Scene, SceneError, Up, builtin, file, gltf, obj, ply, stl};
 use crate::camera::Orbit;
 use glam::{DVec3, Vec3};
 use std::io::Read;
 use std::path::Path;
+use std::sync::Arc;
 
 /// What the command line says about the scene and its playback, over what the scene says.
 #[derive(Clone, Copy, Debug, Default)]
@@ -160,7 +161,7 @@ fn alone(path: &Path, overrides: &Overrides) -> Result<Scene, SceneError> {
     };
     let mut model = loaded?;
     let playback = overrides.apply(Playback { looping: true, ..PLAYBACK })?;
-    let camera = shared(turntable(&model, &playback, FOV, DVec3::Y));
+    let camera = Arc::new(turntable(&model, &playback, FOV, DVec3::Y));
     let mut lights = Vec::new();
     if model.mostly_plain() {
         lights.push(Light { direction: Vec3::new(-1.0, -2.0, -1.0).normalize(), colour: Vec3::ONE, intensity: 1.0 });

@@ -3,9 +3,8 @@
 
 use super::error::Warnings;
 use super::{Material, Texture, Triangle, Up};
-use crate::camera::Path;
+use crate::camera::Animated;
 use glam::DVec3;
-use std::sync::Arc;
 
 /// More triangles than this are refused: they would not fit in the memory of an ordinary machine once traced.
 pub(crate) const MAX_TRIANGLES: usize = 8_000_000;
@@ -15,11 +14,8 @@ pub(crate) struct ModelCamera {
     /// The names it answers to: its own and its node's.
     pub names: Vec<String>,
     /// Its path with the model's field of view, or why it has none.
-    pub path: Result<ModelPath, String>,
+    pub path: Result<Animated, String>,
 }
-
-/// The path of a model's camera.
-pub(crate) type ModelPath = crate::camera::Animated;
 
 /// A loaded model.
 #[derive(Default)]
@@ -101,7 +97,7 @@ impl Model {
     }
 
     /// The path of the camera called `name`.
-    pub(crate) fn camera(&self, name: &str) -> Result<ModelPath, String> {
+    pub(crate) fn camera(&self, name: &str) -> Result<Animated, String> {
         if let Some(camera) = self.cameras.iter().find(|c| c.names.iter().any(|n| n == name)) {
             return camera.path.clone();
         }
@@ -116,11 +112,6 @@ impl Model {
 /// The message for a model that is too large.
 pub(crate) fn too_many(found: usize) -> String {
     format!("{found} triangles; at most {MAX_TRIANGLES} are taken: simplify the model")
-}
-
-/// An `Arc` of a path, as `Scene` wants it.
-pub(crate) fn shared(path: impl Path + 'static) -> Arc<dyn Path> {
-    Arc::new(path)
 }
 
 /// Twice a triangle's area.

@@ -8,6 +8,7 @@ use super::{Material, Texture, Triangle, Wrap, picture, polygon};
 use crate::files::{beside, read as read_file};
 use glam::{DVec3, Vec2, Vec3};
 use std::cell::RefCell;
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// Loads an .obj file; `texture` serves a file whose materials name none.
@@ -31,8 +32,9 @@ fn model(text: &str, folder: &Path, fallback: Option<&Path>) -> Result<Model, St
     let Trouble { told, lost } = trouble.into_inner();
     told.into_iter().for_each(|what| model.warnings.add(what));
     let materials = materials.map_err(|e| format!("materials: {e}"))?;
+    let known: HashSet<&str> = materials.iter().map(|m| m.name.as_str()).collect();
     let used = clean.lines().filter_map(|line| line.strip_prefix("usemtl "));
-    for name in used.filter(|name| !lost && materials.iter().all(|m| m.name != *name)) {
+    for name in used.filter(|name| !lost && !known.contains(name)) {
         model.warnings.add(format!("material \"{name}\" is in no library: left white"));
     }
     let mut textures = Shelf::default();

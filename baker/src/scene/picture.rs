@@ -243,15 +243,9 @@ mod tests {
         // A PNG header that promises 60000 x 60000 texels.
         let mut png = b"\x89PNG\r\n\x1a\n\0\0\0\x0dIHDR".to_vec();
         png.extend([0, 0, 0xea, 0x60, 0, 0, 0xea, 0x60, 8, 6, 0, 0, 0]);
-        png.extend(crc(&png[12..29]).to_be_bytes());
+        png.extend(cubist_core::checksum(&png[12..29]).to_be_bytes());
         png.extend(b"\0\0\0\0IDAT\x35\xaf\x06\x1e\0\0\0\0IEND\xae\x42\x60\x82");
         let e = decode(&png, MAX_TEXELS).unwrap_err();
         assert!(e.contains("too large"), "{e}");
-    }
-
-    fn crc(bytes: &[u8]) -> u32 {
-        !bytes
-            .iter()
-            .fold(!0u32, |crc, b| (0..8).fold(crc ^ u32::from(*b), |c, _| if c & 1 == 1 { 0xedb8_8320 ^ (c >> 1) } else { c >> 1 }))
     }
 }

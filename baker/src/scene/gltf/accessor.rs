@@ -33,6 +33,12 @@ impl Numbers {
         out
     }
 
+    /// These of the elements.
+    pub fn picked(&self, elements: &[usize]) -> Self {
+        let of = |&i: &usize| self.values.get(i * self.width..(i + 1) * self.width).unwrap_or(&[]);
+        Self { width: self.width, count: elements.len(), values: elements.iter().flat_map(of).copied().collect() }
+    }
+
     /// The first element with a number that is infinite or none.
     pub fn first_bad(&self) -> Option<usize> {
         self.values.iter().position(|v| !v.is_finite()).map(|i| i / self.width.max(1))

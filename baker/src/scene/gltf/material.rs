@@ -25,7 +25,7 @@ pub(crate) struct Mapping {
 /// Appends every material of the file to `model`, and one more for primitives without. A material's mapping has
 /// the same index; `None`: no texture.
 pub(crate) fn load(data: Data<'_>, folder: &Path, fallback: Option<&Path>, model: &mut Model) -> Result<Vec<Option<Mapping>>, String> {
-    let mut shelf = Shelf { data, folder, known: Vec::new() };
+    let mut shelf = Shelf { data, folder, known: Vec::new(), lowest: Vec::new() };
     let mut mappings = Vec::new();
     for (i, material) in data.root.materials.iter().enumerate() {
         let name = material.name.as_ref().map_or(format!("material {i}"), |n| format!("material \"{n}\""));
@@ -85,8 +85,7 @@ fn one(shelf: &mut Shelf<'_>, m: &json::Material, name: &str, model: &mut Model)
     };
     let alpha = factor[3].clamp(0.0, 1.0);
     let cutoff = cutoff.filter(|c| {
-        let lowest =
-            texture.and_then(|t| model.textures.get(t as usize)).map_or(255, |t| t.texels.iter().map(|t| t[3]).min().unwrap_or(255));
+        let lowest = texture.and_then(|t| shelf.lowest.get(t as usize)).copied().unwrap_or(255);
         // A mask without holes costs every later stage a test for nothing.
         alpha * f32::from(lowest) / 255.0 < *c
     });
@@ -112,6 +111,8 @@ struct Shelf<'a> {
     folder: &'a Path,
     /// Image, wrap modes, index in the model.
     known: Vec<(usize, [Wrap; 2], u32)>,
+    /// The least alpha of each texture of the model: many materials may ask for it.
+    lowest: Vec<u8>,
 }
 
 impl Shelf<'_> {
@@ -143,6 +144,7 @@ impl Shelf<'_> {
         };
         let decoded = bytes.and_then(|b| picture::texture(&b, wrap, &model.textures)).map_err(|e| format!("{what}: {e}"))?;
         let at = model.textures.len() as u32;
+        self.lowest.push(decoded.texels.iter().map(|texel| texel[3]).min().unwrap_or(255));
         model.textures.push(decoded);
         self.known.push((source, wrap, at));
         Ok(Some(at))

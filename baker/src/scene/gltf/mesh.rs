@@ -25,6 +25,37 @@ struct Primitive {
     material: usize,
 }
 
+impl Primitive {
+    /// The same without vertices that are no triangle's: primitives may share a file's vertices, of which each would hold all.
+    fn trimmed(mut self) -> Self {
+        if 3 * self.corners.len() >= self.positions.len() {
+            return self;
+        }
+        let (mut number, mut used) = (vec![u32::MAX; self.positions.len()], Vec::new());
+        for corner in self.corners.as_flattened_mut() {
+            let number = &mut number[*corner as usize];
+            if *number == u32::MAX {
+                *number = used.len() as u32;
+                used.push(*corner as usize);
+            }
+            *corner = *number;
+        }
+        fn picked<T: Copy>(all: &[T], used: &[usize]) -> Vec<T> {
+            used.iter().filter_map(|&i| all.get(i).copied()).collect()
+        }
+        let Self { positions, normals, uvs, colours, influences, corners, material } = self;
+        Self {
+            positions: picked(&positions, &used),
+            normals: picked(&normals, &used),
+            uvs: picked(&uvs, &used),
+            colours: picked(&colours, &used),
+            influences: influences.iter().map(|(joints, weights)| (joints.picked(&used), weights.picked(&used))).collect(),
+            corners,
+            material,
+        }
+    }
+}
+
 /// Places every mesh of the scene.
 pub(crate) fn load(data: Data<'_>, nodes: &Nodes, mappings: &[Option<Mapping>], model: &mut Model) -> Result<(), String> {
     let root = data.root;
@@ -176,7 +207,7 @@ fn read(
         warnings.add(format!("{place}: {} indices are not whole triangles: the rest is left out", indices.len()));
     }
     let positions = (0..count).map(|i| DVec3::from_array(positions.element::<3>(i))).collect();
-    Ok(Some(Primitive { positions, normals, uvs, colours, influences, corners, material }))
+    Ok(Some(Primitive { positions, normals, uvs, colours, influences, corners, material }.trimmed()))
 }
 
 fn attribute_name(semantic: &Semantic) -> String {
@@ -223,19 +254,14 @@ fn place_one(p: &Primitive, world: DMat4, skin: Option<&[DMat4]>, model: &mut Mo
     if p.corners.is_empty() {
         return Ok(());
     }
-    // Each once, unless most are part of no triangle: a small part of a file's vertices may come in many places.
-    let few = 3 * p.corners.len() < p.positions.len();
-    let vertices = if few { Vec::new() } else { (0..p.positions.len()).map(vertex).collect::<Result<Vec<_>, _>>()? };
+    let vertices = (0..p.positions.len()).map(vertex).collect::<Result<Vec<_>, _>>()?;
     // A mirror turns what goes around to the left: the front stays in front.
     let mirrored = matrix(0)?.determinant() < 0.0;
     model.coloured |= !p.colours.is_empty();
     for c in &p.corners {
         let [a, b, c] = c.map(|i| i as usize);
         let at = if mirrored { [a, c, b] } else { [a, b, c] };
-        let mut placed = [(DVec3::ZERO, Vec3::ZERO); 3];
-        for (placed, &i) in placed.iter_mut().zip(&at) {
-            *placed = if few { vertex(i)? } else { vertices[i] };
-        }
+        let placed = at.map(|i| vertices[i]);
         let normal = placed.map(|(_, normal)| normal);
         model.triangles.push(Triangle {
             position: placed.map(|(position, _)| position),

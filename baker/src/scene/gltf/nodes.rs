@@ -114,7 +114,7 @@ fn link(node: &json::Node) -> Link {
     match &node.matrix {
         Some(m) => {
             let rest = DMat4::from_cols_array(&m.map(f64::from));
-            Link { rest, parts: rest.to_scale_rotation_translation_parts(), channels: Vec::new() }
+            Link { rest, parts: parts(&rest), channels: Vec::new() }
         }
         None => Link {
             rest: DMat4::from_scale_rotation_translation(scale, rotation, translation),
@@ -125,18 +125,12 @@ fn link(node: &json::Node) -> Link {
 }
 
 /// A matrix in parts, translation first.
-trait Parts {
-    fn to_scale_rotation_translation_parts(&self) -> (DVec3, DQuat, DVec3);
-}
-
-impl Parts for DMat4 {
-    fn to_scale_rotation_translation_parts(&self) -> (DVec3, DQuat, DVec3) {
-        if self.determinant() == 0.0 || !self.is_finite() {
-            return (self.w_axis.truncate(), DQuat::IDENTITY, DVec3::ONE);
-        }
-        let (scale, rotation, translation) = self.to_scale_rotation_translation();
-        (translation, rotation, scale)
+fn parts(matrix: &DMat4) -> (DVec3, DQuat, DVec3) {
+    if matrix.determinant() == 0.0 || !matrix.is_finite() {
+        return (matrix.w_axis.truncate(), DQuat::IDENTITY, DVec3::ONE);
     }
+    let (scale, rotation, translation) = matrix.to_scale_rotation_translation();
+    (translation, rotation, scale)
 }
 
 /// Gives every node its channels: for each property the first animation that drives it.
