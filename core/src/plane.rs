@@ -106,12 +106,15 @@ pub struct View {
     scale: i32,
 }
 
+// Of use in many places, and rarely: so is the next one.
+#[inline(never)]
 fn cross(a: [i64; 3], b: [i64; 3]) -> [i64; 3] {
     let ([a, b, c], [d, e, f]) = (a, b);
     let minor = |p: i64, q: i64, r: i64, s: i64| p.wrapping_mul(q).wrapping_sub(r.wrapping_mul(s));
     [minor(b, f, c, e), minor(c, d, a, f), minor(a, e, b, d)]
 }
 
+#[inline(never)]
 fn dot(a: [i64; 3], b: [i64; 3]) -> i64 {
     a.iter().zip(b).fold(0, |sum, (a, b)| sum.wrapping_add(a.wrapping_mul(b)))
 }
@@ -199,10 +202,14 @@ impl View {
 
     /// The positions at the nodes of `row`, from `column` on.
     #[must_use]
+    #[inline(never)]
     pub fn across(&self, column: usize, row: usize) -> Across {
         // Terms are below 2^30 and there are at most 1025 nodes in a row: all are below 2^42.
-        let place = [1, column as i64, row as i64];
-        let [u, v, divisor] = self.terms.map(|terms| dot(terms.map(i64::from), place));
+        let (right, low) = (column as i64, row as i64);
+        let [u, v, divisor] = self.terms.map(|terms| {
+            let [first, column, row] = terms.map(i64::from);
+            first.wrapping_add(column.wrapping_mul(right)).wrapping_add(row.wrapping_mul(low))
+        });
         let [by_u, by_v, by_divisor] = self.terms.map(|[_, column, _]| i64::from(column));
         let (up, down) = match self.scale {
             up @ 0..=20 => (up as u32, 0),
