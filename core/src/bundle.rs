@@ -26,6 +26,12 @@ pub struct Bundle<'a> {
     cameras: &'a [[u8; CAMERA_BYTES]],
 }
 
+/// The bytes of the first section of `tag`.
+#[inline(never)]
+fn find<'a>(sections: &[Section<'a>], tag: [u8; 4]) -> Result<&'a [u8], BundleError> {
+    sections.iter().find(|section| section.tag == tag).map(|section| section.bytes).ok_or(BundleError::Section { tag })
+}
+
 impl<'a> Bundle<'a> {
     /// Checks `bytes` and borrows from them; time linear in their length, no memory.
     ///
@@ -63,7 +69,7 @@ impl<'a> Bundle<'a> {
                 return Err(BundleError::UnknownSection { tag: section.tag });
             }
         }
-        let find = |tag: [u8; 4]| sections.iter().find(|s| s.tag == tag).map(|s| s.bytes).ok_or(BundleError::Section { tag });
+        let find = |tag| find(&sections, tag);
         let path = whole::<Path<'a>>(find(PATH)?).ok_or(BundleError::Section { tag: PATH })?;
         let atlas = whole::<Atlas<'a>>(find(ATLAS)?).ok_or(BundleError::Section { tag: ATLAS })?;
         let (labels, rest) = find(LABELS)?.as_chunks::<LABEL_BYTES>();

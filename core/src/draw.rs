@@ -103,12 +103,39 @@ impl<'d, 'a> Drawing<'d, 'a> {
     #[inline(always)]
     pub fn row<P: Paint>(&mut self, y: u32, out: &mut [P::Pixel], work: &mut Work, paint: &P) {
         let out = self.tiles(y, out, work, paint, false);
-        match self.site.texture.width_log2 {
-            7 => self.mix::<P, 7, 7>(y, out, paint),
-            8 => self.mix::<P, 8, 6>(y, out, paint),
-            9 => self.mix::<P, 9, 6>(y, out, paint),
-            _ => self.mix::<P, 10, 4>(y, out, paint),
+        let log2 = self.site.block_log2();
+        self.sides_by_width(y, 0, out, paint);
+        // The others' loops know where it ends.
+        if P::SHORT && self.site.texture.width_log2 < 10 && out.len() & (1usize << log2).wrapping_sub(1) != 0 {
+            self.cut_sides(y, out, paint);
         }
+        for mixed in self.mixed() {
+            let Some(pixels) = pixels(mixed.block.into(), out, log2) else { break };
+            block(&self.site, *mixed, y, [pixels], paint, [None], &mut []);
+        }
+    }
+
+    /// Draws the sides of pixel row `y` in blocks from `first` on, of which `out` are the pixels, by the width of the picture.
+    #[inline(always)]
+    fn sides_by_width<P: Paint>(&self, y: u32, first: u32, out: &mut [P::Pixel], paint: &P) {
+        match self.site.texture.width_log2 {
+            7 => self.mix::<P, 7, 7>(y, first, out, paint),
+            8 => self.mix::<P, 8, 6>(y, first, out, paint),
+            9 => self.mix::<P, 9, 6>(y, first, out, paint),
+            _ => self.mix::<P, 10, 4>(y, first, out, paint),
+        }
+    }
+
+    /// Draws those of a last block of which `out` has some pixels.
+    #[inline(never)]
+    fn cut_sides<P: Paint>(&self, y: u32, out: &mut [P::Pixel], paint: &P) {
+        let log2 = self.site.block_log2();
+        let whole = out.len() >> log2;
+        let Some(out) = out.get_mut(whole << log2..) else { return };
+        let mut made = [P::Pixel::default(); 1 << BLOCK_LOG2];
+        made.iter_mut().zip(&*out).for_each(|(made, &pixel)| *made = pixel);
+        self.sides_by_width(y, whole as u32, made.get_mut(..1 << log2).unwrap_or(&mut []), paint);
+        out.iter_mut().zip(made).for_each(|(pixel, made)| *pixel = made);
     }
 
     /// Draws the tiles of pixel row `y`. What there is of `out` on the screen comes back: the rest of it is still to be drawn; `sideless`: all torn
@@ -137,41 +164,36 @@ impl<'d, 'a> Drawing<'d, 'a> {
         out
     }
 
-    /// Draws what of pixel row `y` tiles do not show, over them.
+    /// Draws the sides of pixel row `y` in blocks from `first` on, of which `out` are the pixels.
     #[inline(never)]
-    fn mix<P: Paint, const WIDTH: u32, const ROWS: u32>(&self, y: u32, out: &mut [P::Pixel], paint: &P) {
+    fn mix<P: Paint, const WIDTH: u32, const ROWS: u32>(&self, y: u32, first: u32, out: &mut [P::Pixel], paint: &P) {
         let log2 = self.site.block_log2();
         let row = y & (1u32 << log2).wrapping_sub(1);
         // Pictures wider than 512 texels are rare.
         match (P::SHORT && WIDTH <= 9, log2) {
-            (true, 2) => self.sides::<P, WIDTH, ROWS, 4>(row, out, paint),
+            (true, 2) => self.sides::<P, WIDTH, ROWS, 4>(row, first, out, paint),
             // No others have sides.
-            (true, _) => self.sides::<P, WIDTH, ROWS, 8>(row, out, paint),
+            (true, _) => self.sides::<P, WIDTH, ROWS, 8>(row, first, out, paint),
             (false, _) => self.any_sides::<P, WIDTH, ROWS>(row, out, paint),
-        }
-        for mixed in self.mixed() {
-            let Some(pixels) = pixels(mixed.block.into(), out, log2) else { break };
-            block(&self.site, *mixed, y, [pixels], paint, [None], &mut []);
         }
     }
 
-    /// Draws row `row` of the sides, of `PIXELS` pixels each.
+    /// Draws row `row` of the sides in whole blocks of `PIXELS` pixels each: of a known size, a loop over pixels is none.
     #[inline(always)]
-    fn sides<P: Paint, const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(&self, row: u32, out: &mut [P::Pixel], paint: &P) {
-        let (blocks, rest) = out.as_chunks_mut::<PIXELS>();
-        let place = [row, PIXELS.trailing_zeros()];
-        let whole = blocks.len();
+    fn sides<P: Paint, const WIDTH: u32, const ROWS: u32, const PIXELS: usize>(
+        &self,
+        row: u32,
+        first: u32,
+        out: &mut [P::Pixel],
+        paint: &P,
+    ) {
+        let blocks = out.as_chunks_mut::<PIXELS>().0;
         for side in self.plan.side.get(..self.plan.sides).unwrap_or(&[]) {
             let shown = side.shown.row(row);
-            if shown == 0 {
-                continue;
-            }
-            // Said twice: of a known size, a loop over pixels is none.
-            match blocks.get_mut(side.block as usize) {
-                Some(pixels) => paint.side::<WIDTH, ROWS>(side, place, shown, pixels),
-                // Those after it are beyond the row's end.
-                None if side.block as usize == whole => paint.side::<WIDTH, ROWS>(side, place, shown, rest),
-                None => {}
+            if shown != 0
+                && let Some(pixels) = blocks.get_mut(side.block.wrapping_sub(first) as usize)
+            {
+                paint.side::<WIDTH, ROWS>(side, [row, PIXELS.trailing_zeros()], shown, pixels);
             }
         }
     }

@@ -115,6 +115,7 @@ impl<'k> Line<'k> {
     const NOTHING: Chain = Chain { first: NONE, end: NONE, at: 0, field: NONE, label: 0 };
 
     /// The layers of `label` among the `chains` of a row.
+    #[inline(never)]
     pub fn new(chains: &'k [Chain], label: u8) -> Self {
         let from = chains.partition_point(|chain| chain.label < label.into());
         let rest = chains.get(from..).unwrap_or(&[]);

@@ -165,7 +165,8 @@ fn sort(chains: &mut [Chain]) {
                 at = before;
             }
         }
-        step /= 3;
+        // A third of less than 2^16: small processors do not divide.
+        step = step.wrapping_mul(0x5556) >> 16;
     }
 }
 
@@ -260,7 +261,7 @@ impl<'l, 'm> Cells<'l, 'm> {
 
     /// The one label that all cells in each of the next columns list, and how many these are, `most` at most; moves past them. `None` where those in the
     /// next one list others.
-    #[inline(always)]
+    #[inline(never)]
     fn alike(&mut self, most: usize) -> Option<(u8, usize)> {
         let &(first, cursor) = self.0.iter().flatten().next()?;
         let label = first.single(cursor)?;

@@ -74,19 +74,17 @@ impl Plan<'_> {
         self.count();
     }
 
-    /// Counts the tiles of every run of neighbours in one window, whatever they show.
+    /// Counts, from every tile on, its neighbours in one window, whatever they show.
     fn count(&mut self) {
-        let Some((mut first, others)) = self.tile.get_mut(..self.tiles).and_then(<[_]>::split_first_mut) else { return };
-        let mut more = 0u8;
-        for tile in others {
-            if tile.head.row() == first.head.row() && more < u8::MAX {
-                more = more.wrapping_add(1);
-            } else {
-                first.head = first.head.before(more);
-                (first, more) = (tile, 0);
-            }
+        let (mut row, mut more) = (u16::MAX, u8::MAX);
+        let mut tiles = self.tile.get_mut(..self.tiles).unwrap_or(&mut []);
+        // From the right, by a length: of pointers it would be a division, which small processors have none of.
+        while let Some((tile, others)) = tiles.split_last_mut() {
+            more = if tile.head.row() == row { more.saturating_add(1) } else { 0 };
+            row = tile.head.row();
+            tile.head = tile.head.before(more);
+            tiles = others;
         }
-        first.head = first.head.before(more);
     }
 
     /// Plans a stretch of cells that show one sheet.

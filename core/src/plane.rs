@@ -106,12 +106,15 @@ pub struct View {
     scale: i32,
 }
 
+// Of use in many places, and rarely: so is the next one.
+#[inline(never)]
 fn cross(a: [i64; 3], b: [i64; 3]) -> [i64; 3] {
     let ([a, b, c], [d, e, f]) = (a, b);
     let minor = |p: i64, q: i64, r: i64, s: i64| p.wrapping_mul(q).wrapping_sub(r.wrapping_mul(s));
     [minor(b, f, c, e), minor(c, d, a, f), minor(a, e, b, d)]
 }
 
+#[inline(never)]
 fn dot(a: [i64; 3], b: [i64; 3]) -> i64 {
     a.iter().zip(b).fold(0, |sum, (a, b)| sum.wrapping_add(a.wrapping_mul(b)))
 }
@@ -128,10 +131,10 @@ const LIMIT: u32 = 1 << 17;
 /// Division by one number of several whose quotients are small: long divisions are slow on small processors.
 struct Quotient {
     divisor: u64,
-    /// Everything is shifted right by `shift` for a first guess; `short` is the divisor shifted, and one more if bits were lost, so that the guess is
-    /// never too large.
+    /// Everything is shifted right by `shift` for a first guess; what `share` is of 2^32 is one over the divisor shifted, and one more if bits were lost,
+    /// so that the guess is never too large.
     shift: u32,
-    short: u32,
+    share: u32,
 }
 
 impl Quotient {
@@ -139,13 +142,15 @@ impl Quotient {
     const fn new(divisor: u64) -> Self {
         let shift = 49u32.saturating_sub(divisor.leading_zeros());
         let short = (divisor >> shift) as u32;
-        Self { divisor, shift, short: if shift == 0 { short } else { short.wrapping_add(1) } }
+        let share = u32::MAX.checked_div(if shift == 0 { short } else { short.wrapping_add(1) });
+        Self { divisor, shift, share: if let Some(share) = share { share } else { 0 } }
     }
 
     /// `numerator` (below 2^63) divided, rounded down; `None` if that is far above [`LIMIT`].
     fn of(&self, numerator: u64) -> Option<u32> {
-        // Exact, or below 2^32 / 2^14 and too small by at most a 2^14-th of it and one.
-        let guess = u32::try_from(numerator >> self.shift).ok()?.checked_div(self.short)?;
+        // Too small by two, or below 2^32 / 2^14 and by a 2^14-th of it more, at most. Several are divided by one number: a product takes less long.
+        let short = u32::try_from(numerator >> self.shift).ok()?;
+        let guess = (u64::from(short).wrapping_mul(u64::from(self.share)) >> 32) as u32;
         // Far above, it would not fit what it is taken for.
         let mut quotient = Some(guess).filter(|&guess| guess <= LIMIT)?;
         let mut rest = numerator.wrapping_sub(u64::from(quotient).wrapping_mul(self.divisor));
@@ -197,10 +202,14 @@ impl View {
 
     /// The positions at the nodes of `row`, from `column` on.
     #[must_use]
+    #[inline(never)]
     pub fn across(&self, column: usize, row: usize) -> Across {
         // Terms are below 2^30 and there are at most 1025 nodes in a row: all are below 2^42.
-        let place = [1, column as i64, row as i64];
-        let [u, v, divisor] = self.terms.map(|terms| dot(terms.map(i64::from), place));
+        let (right, low) = (column as i64, row as i64);
+        let [u, v, divisor] = self.terms.map(|terms| {
+            let [first, column, row] = terms.map(i64::from);
+            first.wrapping_add(column.wrapping_mul(right)).wrapping_add(row.wrapping_mul(low))
+        });
         let [by_u, by_v, by_divisor] = self.terms.map(|[_, column, _]| i64::from(column));
         let (up, down) = match self.scale {
             up @ 0..=20 => (up as u32, 0),

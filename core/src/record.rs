@@ -33,8 +33,8 @@ pub struct Stream<'m> {
     pub lists: [Lists<'m>; LISTS],
     /// Keys in use: at least 3, the last two and the one that they tell; at most [`MAX_KEYS`].
     pub slots: usize,
-    /// Records coded so far; it turns both rings.
-    pub turn: usize,
+    /// Where the newest record's stand: its key, and its lists.
+    pub newest: [usize; 2],
 }
 
 /// What does not change from record to record.
@@ -130,8 +130,7 @@ impl<'m> Stream<'m> {
                 *view = View::new(&Plane::from_bytes(plane), &place.camera, shape.key_bits);
             }
         }
-        let next = self.turn.wrapping_add(1);
-        let (now_slot, list_slot, list_before_slot) = (self.key_slot(next), self.list_slot(next), self.list_slot(self.turn));
+        let ([now_slot, list_slot], [_, list_before_slot]) = (self.next(), self.newest);
         let mut now = self.keys.get_mut(now_slot).map(core::mem::take).unwrap_or_default();
         let mut lists_after = self.lists.get_mut(list_slot).map(core::mem::take).unwrap_or_default();
         let mut lists_before = self.lists.get_mut(list_before_slot).map(core::mem::take).unwrap_or_default();
@@ -176,7 +175,7 @@ impl<'m> Stream<'m> {
     #[must_use]
     pub fn cost(&self, grid: Grid, place: Place, slice: usize, backdrop: bool) -> u32 {
         let [after, before] = place.list_slices(grid);
-        let around = |rows: Range<usize>| self.lists.get(self.list_slot(self.turn)).map_or(0, |lists| lists.held(rows));
+        let around = |rows: Range<usize>| self.lists.get(self.newest[1]).map_or(0, |lists| lists.held(rows));
         let Some(row) = slice.checked_sub(after.wrapping_add(before)) else {
             let first = slice.checked_sub(after).unwrap_or(slice).wrapping_mul(LIST_ROWS);
             return around(first..first.wrapping_add(LIST_ROWS)).wrapping_add(LIST_COST);
@@ -191,7 +190,7 @@ impl<'m> Stream<'m> {
 
     /// The record that was coded slice by slice is the newest from now on.
     pub fn finish(&mut self) {
-        self.turn = self.turn.wrapping_add(1);
+        self.newest = self.next();
     }
 
     fn put(&mut self, slot: usize, key: Key<'m>, lists: [(usize, Lists<'m>); 2]) {
@@ -205,24 +204,37 @@ impl<'m> Stream<'m> {
         }
     }
 
-    fn key_slot(&self, turn: usize) -> usize {
-        turn.checked_rem(self.slots).unwrap_or(0)
+    /// Places in either ring.
+    fn places(&self) -> [usize; 2] {
+        [self.slots, self.slots.min(LISTS)]
     }
 
-    fn list_slot(&self, turn: usize) -> usize {
-        turn.checked_rem(self.slots.min(LISTS)).unwrap_or(0)
+    /// Where the next record's key and lists stand.
+    fn next(&self) -> [usize; 2] {
+        let ([key, lists], [keys, held]) = (self.newest, self.places());
+        let on = |slot: usize, places: usize| Some(slot.wrapping_add(1)).filter(|&slot| slot < places).unwrap_or(0);
+        [on(key, keys), on(lists, held)]
+    }
+
+    /// Where that stands in a ring of so many `places` which was coded `age` records before what stands at `newest`; `None` where it is not held any
+    /// more, or the next one may stand there.
+    // Without a division: small processors have none.
+    #[inline(always)]
+    fn ago(newest: usize, age: usize, places: usize) -> Option<usize> {
+        let back = newest.checked_sub(age).unwrap_or_else(|| newest.wrapping_add(places).wrapping_sub(age));
+        Some(back).filter(|_| age.wrapping_add(1) < places)
     }
 
     /// The key coded `age` records before the newest; `None` where it is not held any more, or the next one may stand there.
     #[must_use]
     pub fn key(&self, age: usize) -> Option<&Key<'m>> {
-        self.keys.get(self.key_slot(self.turn.wrapping_sub(age))).filter(|_| age.wrapping_add(1) < self.slots)
+        self.keys.get(Self::ago(self.newest[0], age, self.places()[0])?)
     }
 
     /// The lists of the interval that starts at that key.
     #[must_use]
     pub fn lists(&self, age: usize) -> Option<&Lists<'m>> {
-        self.lists.get(self.list_slot(self.turn.wrapping_sub(age))).filter(|_| age.wrapping_add(1) < self.slots.min(LISTS))
+        self.lists.get(Self::ago(self.newest[1], age, self.places()[1])?)
     }
 }
 

@@ -190,6 +190,33 @@ trait Colours {
         tiles: &Tiles<'_>,
         out: &mut [u16],
     );
+
+    /// A row of a side, as [`Paint::side`] has it.
+    #[inline(always)]
+    fn side<F: Filter<Colour = Self::Colour>, const WIDTH: u32, const ROWS: u32>(
+        &self,
+        filter: F,
+        side: &Side,
+        place: [u32; 2],
+        shown: u32,
+        out: &mut [u16],
+    ) {
+        let from = usize::from(side.tile.head.row()).wrapping_shl(WIDTH);
+        part::<_, WIDTH, ROWS>(filter, side, place, shown, out, |index| self.colour(from.wrapping_add(index)));
+    }
+}
+
+/// A row of a side, of colours of its window's texels.
+#[inline(always)]
+fn part<F: Filter, const WIDTH: u32, const ROWS: u32>(
+    filter: F,
+    side: &Side,
+    place: [u32; 2],
+    shown: u32,
+    out: &mut [u16],
+    colour: impl Fn(usize) -> F::Colour,
+) {
+    span::part(&side.tile, place, shown, out, filter.offsets(WIDTH), |at: Packed<WIDTH, ROWS>| filter.packed(at, &colour));
 }
 
 /// Colours looked up by way of a filter.
@@ -216,10 +243,7 @@ impl<C: Colours, F: Filter<Colour = C::Colour>> Paint for Lookup<C, F> {
 
     #[inline(always)]
     fn side<const WIDTH: u32, const ROWS: u32>(&self, side: &Side, place: [u32; 2], shown: u32, out: &mut [u16]) {
-        let from = usize::from(side.tile.head.row()).wrapping_shl(WIDTH);
-        span::part(&side.tile, place, shown, out, self.filter.offsets(WIDTH), |at: Packed<WIDTH, ROWS>| {
-            self.filter.packed(at, |index| self.colours.colour(from.wrapping_add(index)))
-        });
+        self.colours.side::<F, WIDTH, ROWS>(self.filter, side, place, shown, out);
     }
 }
 
@@ -234,6 +258,22 @@ impl<C: Copy + Default> Colours8<'_, C> {
     #[inline(always)]
     fn entry(&self, texel: u8) -> C {
         self.palette.get(usize::from(texel)).copied().unwrap_or_default()
+    }
+
+    /// A row of a side, in a window of `TEXELS`: a place in it is known to be inside the picture.
+    #[inline(always)]
+    fn windowed<F: Filter<Colour = C>, const WIDTH: u32, const ROWS: u32, const TEXELS: usize>(
+        &self,
+        filter: F,
+        side: &Side,
+        place: [u32; 2],
+        shown: u32,
+        out: &mut [u16],
+    ) {
+        let from = self.texture.texels.get(usize::from(side.tile.head.row()).wrapping_shl(WIDTH)..);
+        // The plan keeps windows inside the picture.
+        let Some(window) = from.and_then(<[u8]>::first_chunk::<TEXELS>) else { return };
+        part::<_, WIDTH, ROWS>(filter, side, place, shown, out, |index| self.entry(window.get(index).copied().unwrap_or(0)));
     }
 }
 
@@ -271,6 +311,26 @@ impl<C: Copy + Default> Colours for Colours8<'_, C> {
             paint::<_, _, _, WIDTH, ROWS>(self, filter, tiles, out, window, |window, index| {
                 self.entry(window.get(index).copied().unwrap_or(0))
             });
+        }
+    }
+
+    #[inline(always)]
+    fn side<F: Filter<Colour = Self::Colour>, const WIDTH: u32, const ROWS: u32>(
+        &self,
+        filter: F,
+        side: &Side,
+        place: [u32; 2],
+        shown: u32,
+        out: &mut [u16],
+    ) {
+        // 2^WIDTH times 2^ROWS is one of two numbers; with what is beside the last texel it is more.
+        match (F::REACH < BESIDE, WIDTH.wrapping_add(ROWS)) {
+            (true, 14) => self.windowed::<F, WIDTH, ROWS, 0x4000>(filter, side, place, shown, out),
+            (true, _) => self.windowed::<F, WIDTH, ROWS, 0x8000>(filter, side, place, shown, out),
+            (false, _) => {
+                let from = usize::from(side.tile.head.row()).wrapping_shl(WIDTH);
+                part::<_, WIDTH, ROWS>(filter, side, place, shown, out, |index| self.colour(from.wrapping_add(index)));
+            }
         }
     }
 }

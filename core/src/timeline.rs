@@ -91,6 +91,7 @@ impl Bundle<'_> {
 
     /// Frames of interval `interval`, counted around the loop of a looping path; 0 where there is none.
     #[must_use]
+    #[inline(never)]
     pub fn interval_length(&self, interval: isize) -> u32 {
         let count = self.intervals() as isize;
         let index = if self.looping() { interval.checked_rem_euclid(count).unwrap_or(0) } else { interval };

@@ -135,7 +135,7 @@ impl<'a> Reference<'a> {
             keys: key_memory.each_mut().map(|(rows, chains, uv, [a, b])| Key::new(rows, chains, uv, [a, b])),
             lists: list_memory.each_mut().map(|(rows, data)| Lists::new(rows, data)),
             slots: MAX_KEYS,
-            turn: 0,
+            newest: [0; 2],
         };
         let shape = Shape {
             grid,

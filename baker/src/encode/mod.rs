@@ -288,7 +288,7 @@ impl Memory {
             keys: self.keys.each_mut().map(|(rows, chains, uv, [a, b])| Key::new(rows, chains, uv, [a, b])),
             lists: self.lists.each_mut().map(|(rows, data)| Lists::new(rows, data)),
             slots: MAX_KEYS,
-            turn: 0,
+            newest: [0; 2],
         }
     }
 }
