@@ -47,7 +47,7 @@ impl Step {
     /// Keys twice as far apart, half as far.
     pub const DOUBLE: Self = Self { scale: 1, ..Self::NONE };
     pub const HALF: Self = Self { scale: -1, ..Self::NONE };
-    /// Keys an eighth as far apart.
+    /// Keys an eighth as far apart, at most one a frame.
     pub const EIGHTH: Self = Self { scale: -3, ..Self::NONE };
     /// Keys a little closer, a little farther apart.
     pub const CLOSER: Self = Self { interval: -1, ..Self::NONE };
@@ -102,7 +102,7 @@ fn after(from: &Settings, step: Step, free: &Free) -> Option<Settings> {
     }
     let mut to = *from;
     to.cell = rung(&CELLS, from.cell, step.cell)?;
-    let scaled = if step.scale < 0 { from.key_interval >> -step.scale } else { from.key_interval << step.scale };
+    let scaled = if step.scale < 0 { (from.key_interval >> -step.scale).max(1) } else { from.key_interval << step.scale };
     to.key_interval = rung(&INTERVALS, scaled, step.interval)?;
     if step.lambda != 0 {
         to.coding = from.coding.worth(rung(&LAMBDAS, from.coding.lambda, step.lambda)?);

@@ -27,6 +27,9 @@ const FLICKER: f64 = 1.25;
 const STEADILY: &str = "surfaces go straight on from key to key";
 const TURNING: &str = "outlines turn on their way from key to key";
 const BENDING: &str = "surfaces bend on their way from key to key";
+/// The same where many outlines are.
+const CROSSING: &str = "many outlines cross every cell";
+const SWEEPING: &str = "outlines sweep past between keys";
 /// What keys [`CLOSEST`] frames apart have to gain there, dB: they take time in every frame. As much may farther ones lose of what is seen.
 const TIME: f64 = 0.2;
 /// Frames between keys, at least, where nothing bends and they do not stand closer as it is: keys closer than that take more of every frame's time than all
@@ -37,6 +40,9 @@ const BENT_TRIES: usize = 4;
 /// Texels of the same from which on closer keys are tried whatever crosses cells: a path that turns as fast shows nothing right between its keys, and in
 /// every cell outlines of what passes by.
 const FAST: f64 = 5.0;
+/// So much worse than the mean, dB, is the worst frame where something passes close by the camera between two keys: whole things are missing there for a
+/// frame or two, and a key a frame brings them back. Lattices, which are wrong everywhere, have a half of that.
+const PASSING: f64 = 4.0;
 /// Paths of at most as many frames mostly go fast: closer keys are tried there whatever crosses cells, down to one a frame, and with larger cells. They are
 /// few, and a trial takes little time.
 pub(crate) const BRIEF: u32 = 64;
@@ -75,6 +81,12 @@ pub(crate) fn crossed(quality: &Brief) -> bool {
     quality.wrong_surface_percent >= TORN && quality.path_error_texels.p99 < BENT
 }
 
+/// Whether things are lost in some frames that keys close together would show.
+fn passing(quality: &Brief) -> bool {
+    let uneven = quality.psnr_mean - quality.psnr_min >= PASSING;
+    quality.wrong_surface_percent >= TORN && (uneven || quality.path_error_texels.p99 >= FAST)
+}
+
 /// Steps to climb by, which of them is taken, and how many tries they get.
 type Climb = (Take, &'static [Step], usize);
 
@@ -86,18 +98,21 @@ fn climbs(cell: u32, quality: &Brief, brief: bool) -> Option<(&'static [Climb], 
     const FAR: Climb = (Take::First, &[Step::DOUBLE], 2);
     const CLOSER: Climb = (Take::Most, &[Step::COARSER, Step::HALF], BENT_TRIES);
     const CLOSE: Climb = (Take::First, &[Step::HALF, Step::CLOSER], 2);
-    const FASTER: Climb = (Take::First, &[Step::HALF], BENT_TRIES);
+    // What sweeps past shows with a key a frame, and hardly more than with usual ones where these are twice as close.
+    const FASTER: Climb = (Take::Most, &[Step::HALF, Step::EIGHTH], BENT_TRIES);
     // Where a camera shakes, keys twice as close hit no more of it.
     const FASTEST: Climb = (Take::First, &[Step::HALF, Step::EIGHTH], BENT_TRIES);
     const BRIEFLY: Climb = (Take::First, &[Step::HALF, Step::COARSER, Step::CLOSER], BENT_TRIES);
     let (torn, bent) = (quality.wrong_surface_percent >= TORN, quality.path_error_texels.p99);
     let climbs: &[Climb] = match torn {
         true if (bent < STEADY || cell > USUAL) && brief => &[FINER, FARTHER, FASTEST],
+        true if (bent < STEADY || cell > USUAL) && passing(quality) => &[FINER, FARTHER, FASTER],
         true if bent < STEADY || cell > USUAL => &[FINER, FARTHER],
         true if bent < BENT && brief => &[FARTHER, FASTEST],
+        true if bent < BENT && passing(quality) => &[FARTHER, FASTER],
         true if bent < BENT => &[FARTHER],
         true if brief => &[FASTEST],
-        true if bent >= FAST => &[FASTER],
+        true if passing(quality) => &[FASTER],
         false if bent >= BENT => &[CLOSER],
         false if bent < STEADY && brief => &[FAR, BRIEFLY],
         false if bent < STEADY => &[FAR, CLOSE],
@@ -106,8 +121,8 @@ fn climbs(cell: u32, quality: &Brief, brief: bool) -> Option<(&'static [Climb], 
         true => return None,
     };
     let why = match torn {
-        true if (bent >= FAST || brief && bent >= BENT) && cell <= USUAL => BENDING,
-        true => "many outlines cross every cell",
+        true if bent >= BENT && cell <= USUAL => BENDING,
+        true => CROSSING,
         false if bent >= BENT => BENDING,
         false => STEADILY,
     };
@@ -168,7 +183,7 @@ pub(crate) fn choose(
     // Where a path turns quickly, or is short, keys stand much closer already.
     let (asked, spacing) = (usual.settings.key_interval, usual.encoded.grid.spacing());
     let stand = Settings { key_interval: if 2 * spacing <= asked { spacing } else { asked }, ..usual.settings };
-    let closest = if brief { 1 } else { CLOSEST.min((stand.key_interval / 2).max(1)) };
+    let closest = if brief || passing(all) { 1 } else { CLOSEST.min((stand.key_interval / 2).max(1)) };
     let free = Free { cell: true, interval: true, lambda: false, time: false, space: false, frames: scene.playback.frames };
     let mut better: Option<(f64, Made)> = None;
     let most: usize = climbs.iter().map(|(.., tries)| tries).sum();
@@ -194,7 +209,11 @@ pub(crate) fn choose(
         }
     }
     let Some((_, better)) = better else { return Ok((usual, None)) };
-    let why = if why == STEADILY && better.settings.key_interval < usual.settings.key_interval { TURNING } else { why };
+    let why = match why {
+        STEADILY if better.settings.key_interval < usual.settings.key_interval => TURNING,
+        CROSSING if better.settings.key_interval < usual.settings.key_interval => SWEEPING,
+        why => why,
+    };
     Ok((better, Some(Other { why, usual })))
 }
 
@@ -355,6 +374,16 @@ mod tests {
         assert_eq!(tried(8, 1.9, 0.9), Some((2, "surfaces")));
         // So fast that outlines are no matter.
         assert_eq!([tried(8, 20.0, 4.9), tried(8, 20.0, 5.0)], [None, Some((1, "surfaces"))]);
+        // What passes by in some frames is worth a try of keys close together, last.
+        let uneven = |cell, wrong_surface_percent, p99| {
+            let path_error_texels = verify::PathError { p99, ..verify::PathError::default() };
+            let quality = Brief { psnr_mean: 30.0, psnr_min: 26.0, wrong_surface_percent, path_error_texels };
+            climbs(cell, &quality, false).map(|(climbs, _)| climbs.len())
+        };
+        assert_eq!(
+            [uneven(8, 2.0, 0.9), uneven(8, 2.0, 1.0), uneven(8, 2.0, 2.0), uneven(8, 1.9, 2.0)],
+            [Some(3), Some(2), Some(1), Some(1)]
+        );
         // On a brief path closer keys come last, or alone.
         assert_eq!(
             [of(8, 2.0, 0.9, true), of(8, 2.0, 1.0, true), of(8, 2.0, 2.0, true)].map(|of| of.map(|of| of.0)),

@@ -76,6 +76,8 @@ pub struct Quality {
 pub(crate) struct Brief {
     /// Mean of the frames' PSNR, dB.
     pub psnr_mean: f64,
+    /// That of the worst frame, dB.
+    pub psnr_min: f64,
     /// Share of pixels that show another surface than the exact ray hits, %.
     pub wrong_surface_percent: f64,
     /// How far the played paths are off.
@@ -295,8 +297,9 @@ pub fn against_exact(bytes: &[u8], atlas: &Atlas, progress: &(dyn Fn(u32, u32) +
 /// # Errors
 /// The same.
 pub(crate) fn briefly(bytes: &[u8], image: &SourceImage, gbuffer: &GBuffer) -> Result<Brief, VerifyError> {
-    let Quality { psnr_mean, wrong_surface_percent, path_error_texels, .. } = compare(bytes, (image, gbuffer), false, &|_, _| {})?;
-    Ok(Brief { psnr_mean, wrong_surface_percent, path_error_texels })
+    let Quality { psnr_mean, psnr_min, wrong_surface_percent, path_error_texels, .. } =
+        compare(bytes, (image, gbuffer), false, &|_, _| {})?;
+    Ok(Brief { psnr_mean, psnr_min, wrong_surface_percent, path_error_texels })
 }
 
 /// The figures of both; SSIM and bilinear lookup are left out unless `all` are asked for.

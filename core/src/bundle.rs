@@ -11,10 +11,12 @@ use crate::format::{
 use crate::grid::Grid;
 use crate::mask::{Block, Mask, PLAIN, Shape, Tile};
 use crate::plane::{CAMERA_BYTES, Camera, PLANE_BYTES};
+use crate::playing::Frame;
+use core::fmt;
 use heapless::Vec;
 
-/// A parsed bundle: cheap to copy around by reference, borrowing everything from the bytes.
-#[derive(Clone, Debug)]
+/// A parsed bundle, borrowing everything from the bytes: about 400 bytes of a microcontroller's memory itself.
+#[derive(Clone)]
 pub struct Bundle<'a> {
     sections: Vec<Section<'a>, MAX_SECTIONS>,
     path: Path<'a>,
@@ -33,14 +35,28 @@ fn find<'a>(sections: &[Section<'a>], tag: [u8; 4]) -> Result<&'a [u8], BundleEr
 }
 
 impl<'a> Bundle<'a> {
-    /// Checks `bytes` and borrows from them; time linear in their length, no memory.
+    /// Checks `bytes`, all of which are a bundle, and borrows from them; time linear in their length, no memory.
     ///
     /// # Errors
-    /// [`BundleError`] names what is wrong: not a bundle, damaged, of another version, or with a
-    /// field out of range.
+    /// [`BundleError`] names what is wrong: not a bundle, damaged, of another version, with a field out of range, or followed by other bytes.
+    #[inline]
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, BundleError> {
+        Self::read::<false>(bytes)
+    }
+
+    /// Likewise of a bundle that `bytes` begin with, whatever follows: at an address of a flash only its size is known, not the bundle's.
+    ///
+    /// # Errors
+    /// Those of [`Bundle::parse`] but the last.
+    #[inline]
+    pub fn parse_first(bytes: &'a [u8]) -> Result<Self, BundleError> {
+        Self::read::<true>(bytes)
+    }
+
+    /// A bundle that `MORE` bytes may follow.
     // Not part of its callers: what it takes of the stack is free again before what it returns goes anywhere.
     #[inline(never)]
-    pub fn parse(bytes: &'a [u8]) -> Result<Self, BundleError> {
+    fn read<const MORE: bool>(bytes: &'a [u8]) -> Result<Self, BundleError> {
         let (envelope, rest) = postcard::take_from_bytes::<Envelope<'a>>(bytes).map_err(|_| {
             if bytes.starts_with(&MAGIC) { BundleError::Truncated { length: bytes.len() } } else { BundleError::NotABundle }
         })?;
@@ -51,7 +67,7 @@ impl<'a> Bundle<'a> {
             return Err(BundleError::Version { expected: VERSION, found: envelope.version });
         }
         let (stored, trailing) = rest.split_first_chunk::<4>().ok_or(BundleError::Truncated { length: bytes.len() })?;
-        if !trailing.is_empty() {
+        if !MORE && !trailing.is_empty() {
             return Err(BundleError::TrailingBytes { count: trailing.len() });
         }
         let expected = u32::from_le_bytes(*stored);
@@ -105,6 +121,15 @@ impl<'a> Bundle<'a> {
     #[must_use]
     pub fn looping(&self) -> bool {
         self.path.looping
+    }
+
+    /// The frame to show `micros` microseconds after the first one was shown, at the bundle's own pace: a looping bundle begins anew, another stays at
+    /// its last frame. Who asks a clock before every frame leaves out what comes too late.
+    #[must_use]
+    pub fn frame_at(&self, micros: u64) -> Frame {
+        let (passed, frames) = (micros.saturating_mul(self.fps().into()) / 1_000_000, self.frames().into());
+        let frame = if self.looping() { passed.checked_rem(frames).unwrap_or(0) } else { passed.min(frames.saturating_sub(1)) };
+        Frame(frame as u32)
     }
 
     /// The bounds on memory and work that the bundle states.
@@ -228,6 +253,18 @@ impl<'a> Bundle<'a> {
             width_log2: u32::from(self.atlas.width_log2),
             height: u32::from(self.atlas.height),
         }
+    }
+}
+
+/// What it is, without its bytes.
+impl fmt::Debug for Bundle<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut told = f.debug_struct("Bundle");
+        told.field("size", &self.size()).field("frames", &self.frames()).field("fps", &self.fps()).field("looping", &self.looping());
+        told.field("keys", &self.key_count())
+            .field("labels", &self.label_count())
+            .field("texels", &self.texel_kind())
+            .finish_non_exhaustive()
     }
 }
 

@@ -15,7 +15,7 @@ pub enum BundleError {
         /// Bytes given.
         length: usize,
     },
-    /// Bytes follow the end of the bundle.
+    /// Bytes follow the end of the bundle: [`crate::Bundle::parse_first`] lets them.
     TrailingBytes {
         /// How many.
         count: usize,

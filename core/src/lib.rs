@@ -27,6 +27,9 @@
 //! }
 //! ```
 //!
+//! A firmware wants no more than [`Bundle`], [`Player`], [`Frame`], [`ByteOrder`], a kind of [`Texels`] and the two errors. The modules, [`Window`] and
+//! [`checksum`] are for those who write bundles.
+//!
 //! # What is stored
 //!
 //! One **source image** has every surface that the camera ever sees, each part once, in flat **charts**. A chart's number is
@@ -130,7 +133,7 @@ mod work;
 
 pub use bundle::{Bundle, checksum};
 pub use error::{BundleError, MemoryError};
-pub use graphics::FrameImage;
+pub use graphics::{DrawRow, FrameImage};
 pub use player::Player;
 pub use playing::{ByteOrder, Frame};
 pub use texels::{AnyTexels, Direct565, Indexed4, Indexed8, Spread8, Texels};

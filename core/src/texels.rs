@@ -24,7 +24,7 @@ use crate::span::{self, Packed, Tiles};
 use crate::torn::Side;
 use crate::window::{BESIDE, Line};
 
-/// A kind of texels, or several, that a [`crate::Player`] plays: [`Indexed8`], [`Indexed4`], [`Direct565`] or [`AnyTexels`].
+/// A kind of texels, or several, that a [`crate::Player`] plays: [`Indexed8`], [`Spread8`], [`Indexed4`], [`Direct565`] or [`AnyTexels`].
 pub trait Texels: Source {}
 
 impl<T: Source> Texels for T {}

@@ -59,8 +59,14 @@ pub fn run(loaded: &Loaded, bundle: &Bundle<'_>, player: &mut Player<'_>, as_jso
     }
     let seconds = start.elapsed().as_secs_f64();
     bar.finish_and_clear();
+    // Backwards every step past a key decodes anew.
+    let mut backwards = Spread::default();
+    for frame in (0..frames).rev() {
+        player.seek(Frame(frame));
+        backwards.add(player.work().keys);
+    }
     if as_json {
-        return print(&(serde_json::to_string_pretty(&document(loaded, bundle, &spreads, seconds))? + "\n"));
+        return print(&(serde_json::to_string_pretty(&document(loaded, bundle, &spreads, backwards, seconds))? + "\n"));
     }
     let mut rows = facts(loaded, bundle);
     rows.extend(bundle.sections().map(|s| (format!("section {}", tag(&s)), format!("{} bytes", grouped(s.bytes.len())))));
@@ -83,6 +89,7 @@ pub fn run(loaded: &Loaded, bundle: &Bundle<'_>, player: &mut Player<'_>, as_jso
             format!("mean {:.1}, max {}", spread.mean(frames), grouped(spread.max as usize)),
         ));
     }
+    rows.push(("keys a frame backwards".to_owned(), format!("mean {:.1}, max {}", backwards.mean(frames), backwards.max)));
     rows.push(("keys a seek".to_owned(), format!("at most {}", bundle.limits().seek_keys)));
     print(&aligned(&rows))
 }
@@ -103,7 +110,7 @@ pub fn facts(loaded: &Loaded, bundle: &Bundle<'_>) -> Vec<(String, String)> {
     ]
 }
 
-fn document(loaded: &Loaded, bundle: &Bundle<'_>, spreads: &[Spread], seconds: f64) -> Value {
+fn document(loaded: &Loaded, bundle: &Bundle<'_>, spreads: &[Spread], backwards: Spread, seconds: f64) -> Value {
     let (width, height) = bundle.size();
     let frames = bundle.frames();
     let per_frame = |bytes: usize| bytes as f64 / f64::from(frames);
@@ -130,6 +137,7 @@ fn document(loaded: &Loaded, bundle: &Bundle<'_>, spreads: &[Spread], seconds: f
         "memory": { "workspace": bundle.memory_needed(), "row": width * 2 },
         "host": { "seconds": seconds, "frames_per_second": f64::from(frames) / seconds.max(1e-9) },
         "work": work.collect::<serde_json::Map<String, Value>>(),
+        "keys_backwards": { "mean": backwards.mean(frames), "max": backwards.max },
         "seek_keys_max": bundle.limits().seek_keys,
     })
 }

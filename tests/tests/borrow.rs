@@ -154,6 +154,65 @@ fn a_short_row_buffer_draws_what_it_holds() {
     .expect("the baker's bytes play");
 }
 
+/// A way to draw a row that notes which rows were drawn how far.
+fn noted(player: &mut Player<'_>, y: u32, out: &mut [u16]) {
+    DRAWN.with_borrow_mut(|drawn| drawn.push((y, out.len())));
+    player.fine_row(y, out);
+}
+
+thread_local! {
+    static DRAWN: std::cell::RefCell<Vec<(u32, usize)>> = const { std::cell::RefCell::new(Vec::new()) };
+}
+
+#[test]
+fn an_image_draws_as_it_is_told_and_no_row_that_nobody_sees() {
+    play::visit(bytes(), [6], |_, player| {
+        let mut row = [0; SIZE[0] as usize];
+        let fine: Vec<Vec<u16>> = (0..SIZE[1])
+            .map(|y| {
+                player.fine_row(y, &mut row);
+                row.to_vec()
+            })
+            .collect();
+        // Half of it off the display's left upper corner, and a clip of 10 x 8 pixels in what is left.
+        let (place, clip) = (Point::new(-20, -9), Rectangle::new(Point::new(4, 3), Size::new(10, 8)));
+        let mut display = Display::new(80, 60);
+        let image = player.image_by(&mut row, noted);
+        Image::new(&image, place).draw(&mut display.clipped(&clip)).expect("drawing cannot fail");
+        let colour = |x: i32, y: i32| Rgb565::from(RawU16::new(fine[(y - place.y) as usize][(x - place.x) as usize]));
+        for (x, y) in (0..60).flat_map(|y| (0..80).map(move |x| (x, y))) {
+            let wanted = if clip.contains(Point::new(x, y)) { colour(x, y) } else { Rgb565::MAGENTA };
+            assert_eq!(display.at(x as u32, y as u32), wanted, "{x} {y}");
+        }
+        assert_eq!(DRAWN.take(), (12..20).map(|y| (y, 34)).collect::<Vec<_>>());
+        Image::new(&image, Point::new(80, 0)).draw(&mut display).expect("drawing cannot fail");
+        assert_eq!(DRAWN.take(), []);
+    })
+    .expect("the baker's bytes play");
+}
+
+#[test]
+fn a_clock_tells_the_frame() {
+    let bundle = Bundle::parse(bytes()).expect("the baker's bytes parse");
+    assert_eq!((bundle.fps(), bundle.looping()), (30, false));
+    assert_eq!([0, 33_333, 33_334, 266_667, u64::MAX].map(|micros| bundle.frame_at(micros).0), [0, 0, 1, 8, 8]);
+    let mut scene = scenes::reduced("cone-orbit", SIZE, FRAMES).expect("it is built in");
+    scene.playback.looping = true;
+    let looping = scenes::bake(&scene, &Settings::default()).expect("it bakes").1.bundle;
+    let bundle = Bundle::parse(&looping).expect("the baker's bytes parse");
+    assert_eq!((bundle.fps(), bundle.looping()), (30, true));
+    assert_eq!([266_667, 300_000, 3_600_000_000].map(|micros| bundle.frame_at(micros).0), [8, 0, 0]);
+}
+
+#[test]
+fn a_bundle_and_its_player_are_told_in_a_line() {
+    play::visit(bytes(), [6], |_, player| {
+        let told = format!("{player:?}");
+        assert!(told.contains("Frame(6)") && told.contains("(52, 39)") && told.len() < 300, "{told}");
+    })
+    .expect("the baker's bytes play");
+}
+
 #[test]
 fn an_image_has_its_colours_in_any_byte_order() {
     play::visit(bytes(), [6], |_, player| {

@@ -533,4 +533,12 @@ fn other_files_and_versions_are_told_apart() {
     assert_eq!(Bundle::parse(b"GIF89a..............................").err(), Some(BundleError::NotABundle));
     let trailing = [sound(), &[0; 3]].concat();
     assert_eq!(Bundle::parse(&trailing).err(), Some(BundleError::TrailingBytes { count: 3 }));
+    // As it lies in flash, with whatever was there before behind it.
+    let flash = [sound(), &[0xff; 4096]].concat();
+    assert_eq!(Bundle::parse_first(&flash).map(|bundle| bundle.frames()), Bundle::parse(sound()).map(|bundle| bundle.frames()));
+    assert_eq!(Bundle::parse_first(&sound()[..sound().len() - 1]).err(), Some(BundleError::Truncated { length: sound().len() - 1 }));
+    let mut damaged = flash;
+    damaged[sound().len() / 2] ^= 1;
+    assert!(matches!(Bundle::parse_first(&damaged).err(), Some(BundleError::Checksum { .. })));
+    assert_eq!(Bundle::parse_first(&[0xff; 64]).err(), Some(BundleError::NotABundle));
 }

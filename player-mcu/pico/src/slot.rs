@@ -1,5 +1,5 @@
 //! The bundle to play: the one linked in, or else the one that lies at a fixed address of the flash, where it can be replaced without building
-//! anything. What is found goes to `main`; the bytes are checked by [`Bundle::parse`] and by nothing before it.
+//! anything. What is found goes to `main`; the bytes are checked by [`Bundle::parse_first`] and by nothing before it.
 
 use cubist_core::{Bundle, BundleError};
 
@@ -14,24 +14,19 @@ static LINKED: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/bundle.cubist")
 /// Puts the bundle to play into its place.
 ///
 /// # Errors
-/// Those of [`Bundle::parse`]; `NotABundle` where the flash holds none.
+/// Those of [`Bundle::parse_first`]; `NotABundle` where the flash holds none.
 pub fn open(place: &mut Option<Bundle<'static>>) -> Result<(), BundleError> {
-    let bytes = if LINKED.is_empty() { flash() } else { LINKED };
-    match parse(place, bytes) {
-        // Nothing says how long a bundle in flash is but itself, and parsing how much follows it.
-        Err(BundleError::TrailingBytes { count }) => parse(place, bytes.get(..bytes.len().saturating_sub(count)).unwrap_or(bytes)),
-        done => done,
-    }
+    parse(place, if LINKED.is_empty() { flash() } else { LINKED })
 }
 
-/// Puts the bundle in `bytes` into its place. A function of its own: what it takes of the stack is free again afterwards.
+/// Puts the bundle that `bytes` begin with into its place: nothing but itself says how long one in flash is. A function of its own: what it takes of the stack is free again afterwards.
 ///
 /// # Errors
-/// Those of [`Bundle::parse`].
+/// Those of [`Bundle::parse_first`].
 #[inline(never)]
 pub fn parse(place: &mut Option<Bundle<'static>>, bytes: &'static [u8]) -> Result<(), BundleError> {
     // With `?` the bundle would be on the stack twice.
-    match Bundle::parse(bytes) {
+    match Bundle::parse_first(bytes) {
         Ok(bundle) => {
             *place = Some(bundle);
             Ok(())

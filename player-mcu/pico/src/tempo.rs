@@ -11,18 +11,23 @@ pub enum Mode {
     Position(u16),
 }
 
+/// By so much a potentiometer's readings waver while nobody turns it. A frame that goes back and forth over a key would cost ten.
+const SLACK: u16 = 12;
+
 /// The frame that is shown, and which way it goes from there.
 #[derive(Clone, Copy, Debug)]
 pub struct Tempo {
     frames: u32,
     frame: u32,
     back: bool,
+    /// Where the potentiometer was when that last counted.
+    position: Option<u16>,
 }
 
 impl Tempo {
     /// At the first of `frames` frames.
     pub const fn new(frames: u32) -> Self {
-        Self { frames, frame: 0, back: false }
+        Self { frames, frame: 0, back: false, position: None }
     }
 
     /// The frame that is shown.
@@ -33,6 +38,9 @@ impl Tempo {
     /// Goes on to the next frame.
     pub fn step(&mut self, mode: Mode) {
         let last = self.frames.saturating_sub(1);
+        if !matches!(mode, Mode::Position(_)) {
+            self.position = None;
+        }
         match mode {
             Mode::Loop => {
                 self.back = false;
@@ -46,7 +54,9 @@ impl Tempo {
             // There are fewer than 2^24 frames, and 2^12 positions.
             Mode::Position(position) => {
                 self.back = false;
-                self.frame = ((u64::from(self.frames) * u64::from(position)) >> 12).min(u64::from(last)) as u32;
+                let held = self.position.filter(|held| held.abs_diff(position) <= SLACK).unwrap_or(position);
+                self.position = Some(held);
+                self.frame = ((u64::from(self.frames) * u64::from(held)) >> 12).min(u64::from(last)) as u32;
             }
         }
     }
