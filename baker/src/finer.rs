@@ -98,18 +98,18 @@ fn climbs(cell: u32, quality: &Brief, brief: bool) -> Option<(&'static [Climb], 
     const FAR: Climb = (Take::First, &[Step::DOUBLE], 2);
     const CLOSER: Climb = (Take::Most, &[Step::COARSER, Step::HALF], BENT_TRIES);
     const CLOSE: Climb = (Take::First, &[Step::HALF, Step::CLOSER], 2);
-    // What sweeps past shows with a key a frame, and hardly more than with usual ones where these are twice as close.
-    const FASTER: Climb = (Take::Most, &[Step::HALF, Step::EIGHTH], BENT_TRIES);
+    // What sweeps past may show with a key a frame, and hardly more than with usual ones where these are twice as close.
+    const FASTER: Climb = (Take::Most, &[Step::HALF, Step::EIGHTH, Step::CLOSER], BENT_TRIES);
     // Where a camera shakes, keys twice as close hit no more of it.
     const FASTEST: Climb = (Take::First, &[Step::HALF, Step::EIGHTH], BENT_TRIES);
     const BRIEFLY: Climb = (Take::First, &[Step::HALF, Step::COARSER, Step::CLOSER], BENT_TRIES);
     let (torn, bent) = (quality.wrong_surface_percent >= TORN, quality.path_error_texels.p99);
     let climbs: &[Climb] = match torn {
         true if (bent < STEADY || cell > USUAL) && brief => &[FINER, FARTHER, FASTEST],
-        true if (bent < STEADY || cell > USUAL) && passing(quality) => &[FINER, FARTHER, FASTER],
+        true if (bent < STEADY || cell > USUAL) && passing(quality) => &[FASTER, FINER, FARTHER],
         true if bent < STEADY || cell > USUAL => &[FINER, FARTHER],
         true if bent < BENT && brief => &[FARTHER, FASTEST],
-        true if bent < BENT && passing(quality) => &[FARTHER, FASTER],
+        true if bent < BENT && passing(quality) => &[FASTER, FARTHER],
         true if bent < BENT => &[FARTHER],
         true if brief => &[FASTEST],
         true if passing(quality) => &[FASTER],
@@ -374,7 +374,7 @@ mod tests {
         assert_eq!(tried(8, 1.9, 0.9), Some((2, "surfaces")));
         // So fast that outlines are no matter.
         assert_eq!([tried(8, 20.0, 4.9), tried(8, 20.0, 5.0)], [None, Some((1, "surfaces"))]);
-        // What passes by in some frames is worth a try of keys close together, last.
+        // What passes by in some frames is worth a try of keys close together, first.
         let uneven = |cell, wrong_surface_percent, p99| {
             let path_error_texels = verify::PathError { p99, ..verify::PathError::default() };
             let quality = Brief { psnr_mean: 30.0, psnr_min: 26.0, wrong_surface_percent, path_error_texels };

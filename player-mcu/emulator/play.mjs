@@ -2,7 +2,7 @@
 //
 //   node play.mjs --firmware ELF --display st7789|ili9341 --frames FILE --size WxH [--bundle FILE] [--stops N] [--run N] [--png DIR]
 //
-// FILE of --frames has the host's frames, RGB565, little-endian, one after the other (`cubist-mcu frames`). The bundle is put into flash where the
+// FILE of --frames has the host's frames, RGB565, little-endian, one after the other (`cargo run -p cubist-mcu -- frames BUNDLE FILE` writes it). The bundle is put into flash where the
 // firmware looks for one; without it that is erased. The potentiometer is turned to so many stops, from each of which so many frames
 // are played; at the end the last frames are played to and fro. Out comes a line of JSON for each frame: its number, the mode it was shown in,
 // the cycles that the processor worked on it (no wait states), its wrong pixels; then one with sums and the deepest stack. Exit code 1: a wrong pixel, or no end.
