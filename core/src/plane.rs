@@ -106,15 +106,12 @@ pub struct View {
     scale: i32,
 }
 
-// Of use in many places, and rarely: so is the next one.
-#[inline(never)]
 fn cross(a: [i64; 3], b: [i64; 3]) -> [i64; 3] {
     let ([a, b, c], [d, e, f]) = (a, b);
     let minor = |p: i64, q: i64, r: i64, s: i64| p.wrapping_mul(q).wrapping_sub(r.wrapping_mul(s));
     [minor(b, f, c, e), minor(c, d, a, f), minor(a, e, b, d)]
 }
 
-#[inline(never)]
 fn dot(a: [i64; 3], b: [i64; 3]) -> i64 {
     a.iter().zip(b).fold(0, |sum, (a, b)| sum.wrapping_add(a.wrapping_mul(b)))
 }
