@@ -78,7 +78,8 @@ fn bake(name: &str, output: &Path, args: &Bake) -> Result<()> {
 }
 
 /// What scenes are read from, by the ends of their files' names.
-const INPUTS: [&str; 14] = ["toml", "glb", "gltf", "bin", "obj", "mtl", "ply", "stl", "png", "jpg", "jpeg", "gif", "tif", "tiff"];
+const INPUTS: [&str; 18] =
+    ["toml", "glb", "gltf", "bin", "obj", "mtl", "ply", "stl", "png", "jpg", "jpeg", "gif", "tif", "tiff", "bmp", "tga", "webp", "dds"];
 
 /// Refuses, as wrong usage, to write over the scene, or the report over the bundle; or to a name that only files of scenes have.
 fn distinct(scene: &str, output: &Path, report: Option<&Path>) {

@@ -203,6 +203,9 @@ fn gave_up(room: usize, asked: &Settings, whole: Option<Whole>, tried: &Tried, p
         }
         None => format!("{psnr:.2} dB before repainting, in {} bytes of memory", grouped(tried.memory)),
     };
+    if changes.is_empty() {
+        return format!("--ram {room}: nothing was given up to fit: {cost}");
+    }
     format!("--ram {room}: to fit, the bundle has {}: {cost}", changes.join(", "))
 }
 
