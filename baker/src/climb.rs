@@ -102,7 +102,12 @@ fn after(from: &Settings, step: Step, free: &Free) -> Option<Settings> {
     }
     let mut to = *from;
     to.cell = rung(&CELLS, from.cell, step.cell)?;
-    let scaled = if step.scale < 0 { (from.key_interval >> -step.scale).max(1) } else { from.key_interval << step.scale };
+    let scaled = match step.scale {
+        0.. => from.key_interval << step.scale,
+        -1 => from.key_interval >> 1,
+        // What is meant is close together: of a few frames an eighth is one.
+        _ => (from.key_interval >> -step.scale).max(1),
+    };
     to.key_interval = rung(&INTERVALS, scaled, step.interval)?;
     if step.lambda != 0 {
         to.coding = from.coding.worth(rung(&LAMBDAS, from.coding.lambda, step.lambda)?);
