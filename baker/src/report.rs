@@ -21,6 +21,8 @@ const COARSE: f64 = 0.7;
 const DROPPED_PERCENT: f64 = 0.01;
 /// Of the pixels that show the scene, percent, from which on the warning says that most likely something else was meant.
 const LOST_PERCENT: f64 = 25.0;
+/// With so many wrong pixels, percent, and a worst frame so much worse than the mean, dB, whole things are missing there.
+const MISSING: (f64, f64) = (2.0, 4.0);
 
 /// Seconds by stage, wall clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -289,7 +291,7 @@ impl Report {
             work,
             torn_by_cause: encoded.torn_by_cause,
             effects: if image.kind.colours() > 0 { vec!["palette".to_owned()] } else { Vec::new() },
-            warnings: scene.warnings.iter().cloned().chain(warnings(origin)).collect(),
+            warnings: scene.warnings.iter().cloned().chain(warnings(origin)).chain(missing(&quality, settings.key_interval)).collect(),
         }
     }
 
@@ -309,6 +311,19 @@ fn finer(cell: u32, interval: u32) -> &'static str {
         (_, 2..) => "a shorter --key-interval keeps them",
         _ => "a larger --size keeps them",
     }
+}
+
+/// Tells a frame in which whole things are missing.
+fn missing(quality: &Quality, interval: u32) -> Option<String> {
+    let (wrong, worse) = MISSING;
+    let off = quality.psnr_mean - quality.psnr_min;
+    let cure = if interval > 1 { "--key-interval 1 keeps most of them" } else { "a slower path, or more --frames, keeps them" };
+    (quality.wrong_surface_percent >= wrong && off >= worse).then(|| {
+        format!(
+            "frame {} is {off:.1} dB worse than the mean: things that sweep past the camera are missing there; {cure}",
+            quality.worst_frame
+        )
+    })
 }
 
 /// What the pipeline itself warns of.
@@ -480,5 +495,19 @@ mod tests {
         assert!(finer(8, 8).contains("--cell"));
         assert!(finer(4, 8).contains("--key-interval"));
         assert!(finer(4, 1).contains("--size"));
+    }
+
+    #[test]
+    fn what_is_missing_in_a_frame_is_told() {
+        let quality = |psnr_min, wrong_surface_percent| Quality {
+            psnr_mean: 30.0,
+            psnr_min,
+            worst_frame: 7,
+            wrong_surface_percent,
+            ..Quality::default()
+        };
+        assert!(missing(&quality(25.0, 3.0), 8).unwrap().starts_with("frame 7 is 5.0 dB worse"));
+        assert!(missing(&quality(25.0, 3.0), 1).unwrap().contains("--frames"));
+        assert!(missing(&quality(25.0, 1.0), 8).is_none() && missing(&quality(27.0, 3.0), 8).is_none());
     }
 }

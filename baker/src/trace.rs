@@ -319,11 +319,14 @@ pub(crate) struct Bare {
 impl Bare {
     /// The triangles of `scene`, and `rays` by their origins and directions; `None` where there are none of either.
     pub fn new(scene: &Scene, rays: impl Iterator<Item = (DVec3, DVec3)>) -> Option<Self> {
+        if scene.triangles.is_empty() {
+            return None;
+        }
         let (centre, _) = extent(scene);
         let corners = scene.triangles.iter().map(|t| t.position.map(|p| (p - centre).as_vec3a()));
         let triangles: Vec<obvhs::triangle::Triangle> = corners.map(|[v0, v1, v2]| obvhs::triangle::Triangle { v0, v1, v2 }).collect();
         let rays: Vec<Ray> = rays.map(|(origin, direction)| Ray::new_inf((origin - centre).as_vec3a(), direction.as_vec3a())).collect();
-        if triangles.is_empty() || rays.is_empty() {
+        if rays.is_empty() {
             return None;
         }
         let boxes = build(&triangles);
