@@ -11,7 +11,6 @@ use crate::format::{
 use crate::grid::Grid;
 use crate::mask::{Block, Mask, PLAIN, Shape, Tile};
 use crate::plane::{CAMERA_BYTES, Camera, PLANE_BYTES};
-use crate::playing::Frame;
 use core::fmt;
 use heapless::Vec;
 
@@ -121,15 +120,6 @@ impl<'a> Bundle<'a> {
     #[must_use]
     pub fn looping(&self) -> bool {
         self.path.looping
-    }
-
-    /// The frame to show `micros` microseconds after the first one was shown, at the bundle's own pace: a looping bundle begins anew, another stays at
-    /// its last frame. Who asks a clock before every frame leaves out what comes too late.
-    #[must_use]
-    pub fn frame_at(&self, micros: u64) -> Frame {
-        let (passed, frames) = (micros.saturating_mul(self.fps().into()) / 1_000_000, self.frames().into());
-        let frame = if self.looping() { passed.checked_rem(frames).unwrap_or(0) } else { passed.min(frames.saturating_sub(1)) };
-        Frame(frame as u32)
     }
 
     /// The bounds on memory and work that the bundle states.

@@ -98,6 +98,7 @@ mod atlas;
 mod bounds;
 mod bundle;
 pub mod coder;
+mod colours;
 mod coverage;
 mod draw;
 mod error;

@@ -111,6 +111,17 @@ pub struct Look<'t> {
     pub swapped: bool,
 }
 
+impl Bundle<'_> {
+    /// The frame to show `micros` microseconds after the first one was shown, at the bundle's own pace: a looping bundle begins anew, another stays at
+    /// its last frame. Who asks a clock before every frame leaves out what comes too late.
+    #[must_use]
+    pub fn frame_at(&self, micros: u64) -> Frame {
+        let (passed, frames) = (micros.saturating_mul(self.fps().into()) / 1_000_000, self.frames().into());
+        let frame = if self.looping() { passed.checked_rem(frames).unwrap_or(0) } else { passed.min(frames.saturating_sub(1)) };
+        Frame(frame as u32)
+    }
+}
+
 impl<'a> Playing<'a> {
     /// At frame 0, of which nothing is decoded before it is drawn; it has no memory before [`Playing::give`].
     // In two steps because this is large: returned by what cuts memory up, it would be on the stack twice.

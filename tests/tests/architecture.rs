@@ -7,10 +7,10 @@ use source::Source;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// The core's modules from the bottom up: each may use those before it, none after it.
-const ORDER: [&str; 37] = [
+const ORDER: [&str; 38] = [
     "fixed", "bounds", "plane", "format", "error", "coder", "grid", "lists", "key", "predict", "field", "nodes", "record", "mask", "pack",
     "atlas", "form", "coverage", "bundle", "timeline", "row", "sheet", "patch", "window", "site", "span", "torn", "plan", "filter",
-    "memory", "work", "draw", "playing", "texels", "player", "graphics", "lib",
+    "memory", "work", "draw", "playing", "colours", "texels", "player", "graphics", "lib",
 ];
 
 /// Crates that only certain files (or folders, with a slash at the end) may name, so that they can be replaced there.
