@@ -81,10 +81,15 @@ pub(crate) fn crossed(quality: &Brief) -> bool {
     quality.wrong_surface_percent >= TORN && quality.path_error_texels.p99 < BENT
 }
 
+/// By how much the worst frame is worse than the mean, dB, where whole things are missing in it: `wrong` pixels, percent; PSNR, the mean and the worst.
+pub(crate) fn uneven(wrong: f64, [mean, worst]: [f64; 2]) -> Option<f64> {
+    Some(mean - worst).filter(|off| wrong >= TORN && *off >= PASSING)
+}
+
 /// Whether things are lost in some frames that keys close together would show.
 fn passing(quality: &Brief) -> bool {
-    let uneven = quality.psnr_mean - quality.psnr_min >= PASSING;
-    quality.wrong_surface_percent >= TORN && (uneven || quality.path_error_texels.p99 >= FAST)
+    let &Brief { psnr_mean, psnr_min, wrong_surface_percent, path_error_texels } = quality;
+    uneven(wrong_surface_percent, [psnr_mean, psnr_min]).is_some() || wrong_surface_percent >= TORN && path_error_texels.p99 >= FAST
 }
 
 /// Steps to climb by, which of them is taken, and how many tries they get.

@@ -77,9 +77,8 @@ fn bake(name: &str, output: &Path, args: &Bake) -> Result<()> {
     print(&aligned(&report::table(&baked.report)))
 }
 
-/// What scenes are read from, by the ends of their files' names.
-const INPUTS: [&str; 18] =
-    ["toml", "glb", "gltf", "bin", "obj", "mtl", "ply", "stl", "png", "jpg", "jpeg", "gif", "tif", "tiff", "bmp", "tga", "webp", "dds"];
+/// What scenes are read from beside models, by the ends of their files' names.
+const INPUTS: [&str; 13] = ["toml", "bin", "mtl", "png", "jpg", "jpeg", "gif", "tif", "tiff", "bmp", "tga", "webp", "dds"];
 
 /// Refuses, as wrong usage, to write over the scene, or the report over the bundle; or to a name that only files of scenes have.
 fn distinct(scene: &str, output: &Path, report: Option<&Path>) {
@@ -97,7 +96,7 @@ fn clash(option: &str, path: &Path, others: &[(&str, &Path)]) -> Option<String> 
         return Some(format!("{option} {shown}: that is the {what}, which would be replaced; name another file"));
     }
     let end = path.extension()?.to_str()?.to_ascii_lowercase();
-    let inputs = INPUTS.contains(&end.as_str());
+    let inputs = scene::MODELS.contains(&end.as_str()) || INPUTS.contains(&end.as_str());
     inputs.then(|| format!("{option} {shown}: so a scene's own files are called; expected OUT.cubist, or OUT.json for a report"))
 }
 

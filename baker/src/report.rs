@@ -6,6 +6,7 @@ use crate::bake::{Encoded, Flat, Settings};
 use crate::bends::{self, Bends};
 use crate::causes::Causes;
 use crate::chart::{self, Family, Trial};
+use crate::finer::uneven;
 use crate::inspect::{Inspection, space_name, time_name};
 use crate::outlines;
 use crate::scene::Scene;
@@ -21,8 +22,6 @@ const COARSE: f64 = 0.7;
 const DROPPED_PERCENT: f64 = 0.01;
 /// Of the pixels that show the scene, percent, from which on the warning says that most likely something else was meant.
 const LOST_PERCENT: f64 = 25.0;
-/// With so many wrong pixels, percent, and a worst frame so much worse than the mean, dB, whole things are missing there.
-const MISSING: (f64, f64) = (2.0, 4.0);
 
 /// Seconds by stage, wall clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -315,15 +314,12 @@ fn finer(cell: u32, interval: u32) -> &'static str {
 
 /// Tells a frame in which whole things are missing.
 fn missing(quality: &Quality, interval: u32) -> Option<String> {
-    let (wrong, worse) = MISSING;
-    let off = quality.psnr_mean - quality.psnr_min;
+    let off = uneven(quality.wrong_surface_percent, [quality.psnr_mean, quality.psnr_min])?;
     let cure = if interval > 1 { "--key-interval 1 keeps most of them" } else { "a slower path, or more --frames, keeps them" };
-    (quality.wrong_surface_percent >= wrong && off >= worse).then(|| {
-        format!(
-            "frame {} is {off:.1} dB worse than the mean: things that sweep past the camera are missing there; {cure}",
-            quality.worst_frame
-        )
-    })
+    Some(format!(
+        "frame {} is {off:.1} dB worse than the mean: things that sweep past the camera are missing there; {cure}",
+        quality.worst_frame
+    ))
 }
 
 /// What the pipeline itself warns of.

@@ -42,9 +42,22 @@ pub trait Colours {
         shown: u32,
         out: &mut [u16],
     ) {
-        let from = usize::from(side.tile.head.row()).wrapping_shl(WIDTH);
-        part::<_, WIDTH, ROWS>(filter, side, place, shown, out, |index| self.colour(from.wrapping_add(index)));
+        anywhere::<_, _, WIDTH, ROWS>(self, filter, side, place, shown, out);
     }
+}
+
+/// A row of a side, of colours looked up in the whole picture.
+#[inline(always)]
+fn anywhere<C: Colours + ?Sized, F: Filter<Colour = C::Colour>, const WIDTH: u32, const ROWS: u32>(
+    colours: &C,
+    filter: F,
+    side: &Side,
+    place: [u32; 2],
+    shown: u32,
+    out: &mut [u16],
+) {
+    let from = usize::from(side.tile.head.row()).wrapping_shl(WIDTH);
+    part::<_, WIDTH, ROWS>(filter, side, place, shown, out, |index| colours.colour(from.wrapping_add(index)));
 }
 
 /// A row of a side, of colours of its window's texels.
@@ -172,10 +185,7 @@ impl<C: Copy + Default> Colours for Colours8<'_, C> {
         match (F::REACH < BESIDE, WIDTH.wrapping_add(ROWS)) {
             (true, 14) => self.windowed::<F, WIDTH, ROWS, 0x4000>(filter, side, place, shown, out),
             (true, _) => self.windowed::<F, WIDTH, ROWS, 0x8000>(filter, side, place, shown, out),
-            (false, _) => {
-                let from = usize::from(side.tile.head.row()).wrapping_shl(WIDTH);
-                part::<_, WIDTH, ROWS>(filter, side, place, shown, out, |index| self.colour(from.wrapping_add(index)));
-            }
+            (false, _) => anywhere::<_, _, WIDTH, ROWS>(self, filter, side, place, shown, out),
         }
     }
 }

@@ -202,11 +202,8 @@ impl View {
     #[inline(never)]
     pub fn across(&self, column: usize, row: usize) -> Across {
         // Terms are below 2^30 and there are at most 1025 nodes in a row: all are below 2^42.
-        let (right, low) = (column as i64, row as i64);
-        let [u, v, divisor] = self.terms.map(|terms| {
-            let [first, column, row] = terms.map(i64::from);
-            first.wrapping_add(column.wrapping_mul(right)).wrapping_add(row.wrapping_mul(low))
-        });
+        let place = [1, column as i64, row as i64];
+        let [u, v, divisor] = self.terms.map(|terms| dot(terms.map(i64::from), place));
         let [by_u, by_v, by_divisor] = self.terms.map(|[_, column, _]| i64::from(column));
         let (up, down) = match self.scale {
             up @ 0..=20 => (up as u32, 0),

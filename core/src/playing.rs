@@ -116,9 +116,13 @@ impl Bundle<'_> {
     /// its last frame. Who asks a clock before every frame leaves out what comes too late.
     #[must_use]
     pub fn frame_at(&self, micros: u64) -> Frame {
-        let (passed, frames) = (micros.saturating_mul(self.fps().into()) / 1_000_000, self.frames().into());
-        let frame = if self.looping() { passed.checked_rem(frames).unwrap_or(0) } else { passed.min(frames.saturating_sub(1)) };
-        Frame(frame as u32)
+        Frame(self.on_path(micros.saturating_mul(self.fps().into()) / 1_000_000))
+    }
+
+    /// The frame that stands for `frame`, which may be past the end.
+    fn on_path(&self, frame: u64) -> u32 {
+        let frames = u64::from(self.frames());
+        (if self.looping() { frame.checked_rem(frames).unwrap_or(0) } else { frame.min(frames.saturating_sub(1)) }) as u32
     }
 }
 
@@ -171,8 +175,7 @@ impl<'a> Playing<'a> {
 
     /// Makes `frame` the current frame, and decodes the next key as far as it is due.
     pub fn seek(&mut self, frame: Frame) {
-        let frames = self.bundle.frames();
-        let frame = if self.bundle.looping() { frame.0.checked_rem(frames).unwrap_or(0) } else { frame.0.min(frames.saturating_sub(1)) };
+        let frame = self.bundle.on_path(frame.0.into());
         self.work = Work::default();
         self.loaded = None;
         self.frame = Frame(frame);
