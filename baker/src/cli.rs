@@ -303,10 +303,10 @@ impl Bake {
     #[must_use]
     pub fn options(&self, load_seconds: f64) -> Options {
         let goal = match (self.budget, self.psnr, self.ram) {
-            (Some(budget), ..) => Goal::Budget(budget),
-            (None, Some(psnr), _) => Goal::Psnr(psnr),
-            (None, None, Some(ram)) => Goal::Ram(usize::try_from(ram).unwrap_or(usize::MAX)),
-            (None, None, None) => Goal::AsSet,
+            (Some(budget), ..) => Some(Goal::Budget(budget)),
+            (None, Some(psnr), _) => Some(Goal::Psnr(psnr)),
+            (None, None, Some(ram)) => Some(Goal::Ram(usize::try_from(ram).unwrap_or(usize::MAX))),
+            (None, None, None) => None,
         };
         let time = |time| match time {
             Time::Hold => TIME_HOLD,
@@ -498,10 +498,10 @@ mod tests {
         Cli::command().debug_assert();
         let cli = Cli::try_parse_from(["cubist-bake", "a.toml", "-o", "a.cubist", "--budget", "64K", "--truth", "all"]).unwrap();
         let options = cli.bake.options(0.5);
-        assert_eq!((options.goal, options.truth, options.load_seconds), (Goal::Budget(65_536), TruthFrames::All, 0.5));
+        assert_eq!((options.goal, options.truth, options.load_seconds), (Some(Goal::Budget(65_536)), TruthFrames::All, 0.5));
         let wanted = ["cubist-bake", "a.glb", "-o", "a.cubist", "--ram", "16K", "--time", "linear", "--space", "cubic", "--even-keys"];
         let options = Cli::try_parse_from(wanted).unwrap().bake.options(0.0);
-        assert_eq!((options.goal, options.even_keys), (Goal::Ram(16_384), true));
+        assert_eq!((options.goal, options.even_keys), (Some(Goal::Ram(16_384)), true));
         assert_eq!((options.time, options.space), (Some(TIME_LINEAR), Some(SPACE_CUBIC)));
         let packed = Cli::try_parse_from(["cubist-bake", "a.glb", "-o", "a.cubist", "--storage", "packed"]).unwrap().bake.options(0.0);
         assert_eq!((packed.source().storage, packed.source().outline), (atlas::Storage::Packed, None));

@@ -76,18 +76,21 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
 
 /// Like [`by`], of charts that are chosen. What is baked where nothing is asked for is the answer where it is as good a one.
 fn toward(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<Baked, BakeError> {
-    let usual = |storage| once(tracer, &Options { goal: Goal::AsSet, storage, ..*options }, None, progress);
-    match options.goal {
-        Goal::AsSet => once(tracer, options, None, progress),
+    let usual = |storage| once(tracer, &Options { goal: None, storage, ..*options }, None, progress);
+    let Some(goal) = options.goal else { return once(tracer, options, None, progress) };
+    match goal {
         // What needs no more memory than there is stays as it is; where it cannot be had at all, the search says why.
-        Goal::Ram(room) => match usual(options.storage) {
-            Ok(baked) if baked.report.memory.workspace <= room => Ok(baked),
+        Goal::Ram(_) => match usual(options.storage) {
+            Ok(baked) if usual::reaches(goal, &baked) => Ok(baked),
             Ok(Baked { settings, report, psnr_before: psnr, .. }) => {
                 once(tracer, options, Some(Whole { settings, memory: report.memory.workspace, psnr }), progress)
             }
             Err(_) => once(tracer, options, None, progress),
         },
-        _ => usual::or_found(options, &Seen::new(tracer, None), once(tracer, options, None, progress), |storage| usual(Some(storage))),
+        Goal::Budget(_) | Goal::Psnr(_) => {
+            let found = once(tracer, options, None, progress);
+            usual::or_found((goal, options.source().storage), &Seen::new(tracer, None), found, |storage| usual(Some(storage)))
+        }
     }
 }
 
@@ -96,15 +99,15 @@ fn once(tracer: &Tracer<'_>, options: &Options, whole: Option<Whole>, progress: 
     let (start, scene) = (Instant::now(), tracer.scene());
     // What outlines need of it, flash has. Where memory or quality is searched for no finer ones are tried.
     let outline = whole.map_or(options.source.outline, |whole| whole.settings.atlas.outline);
-    let outline = if matches!(options.goal, Goal::AsSet | Goal::Budget(_)) { outline } else { outline.or(Some(0)) };
+    let outline = if matches!(options.goal, None | Some(Goal::Budget(_))) { outline } else { outline.or(Some(0)) };
     let options = &Options { source: atlas::Settings { outline, ..options.source }, ..*options };
     let cast = Cast::by(tracer.of(scene), progress);
     let paint_start = Instant::now();
     let painter = (!options.plain).then(|| Painter::new(&cast, progress));
     let paint_seconds = paint_start.elapsed().as_secs_f64();
     let (chosen, surface) = match options.goal {
-        Goal::AsSet => as_set(&cast, options, progress)?,
-        goal => (tune::search((&cast, painter.as_ref()), options, goal, whole, progress)?, Surface::default()),
+        None => as_set(&cast, options, progress)?,
+        Some(goal) => (tune::search((&cast, painter.as_ref()), options, goal, whole, progress)?, Surface::default()),
     };
     let Chosen { mut flat, encoded, settings, search_seconds, warnings, contested } = chosen;
     // Large, and of no more use.
@@ -187,7 +190,7 @@ fn bettered(
 ) -> Result<Bettered, BakeError> {
     let usual = made.settings;
     let (made, outlines) = outlines::choose(scene, flat, fitted, made, options.budget(), progress)?;
-    if options.goal != Goal::AsSet {
+    if options.goal.is_some() {
         return Ok(Bettered { made, outlines, spaces: Vec::new(), why: None });
     }
     let all = made.quality;

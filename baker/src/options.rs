@@ -9,12 +9,9 @@ const WIDE: u32 = 640;
 /// and of 32: of smaller ones there are more than a bundle holds.
 const VAST: u32 = 2560;
 
-/// What the bundle is to reach.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// What the bundle is to reach, by a search for the settings that do.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Goal {
-    /// What the settings give.
-    #[default]
-    AsSet,
     /// At most this many bytes, at the best quality that fits.
     Budget(u64),
     /// The fewest bytes with at least this mean PSNR, dB, against exact ray casting.
@@ -65,8 +62,8 @@ pub struct Options {
     pub all_sheets: bool,
     /// Texels keep the colours of what lies there, whatever playback makes of them.
     pub plain: bool,
-    /// What to reach.
-    pub goal: Goal,
+    /// What to reach; `None`: what the settings give.
+    pub goal: Option<Goal>,
     /// How much is compared with the truth.
     pub truth: TruthFrames,
     /// Seconds that reading the scene took, for the report.
@@ -90,7 +87,7 @@ impl Default for Options {
             independent_every: Settings::default().coding.independent_every,
             all_sheets: false,
             plain: false,
-            goal: Goal::AsSet,
+            goal: None,
             truth: TruthFrames::Most(16),
             load_seconds: 0.0,
         }
@@ -105,7 +102,7 @@ impl Options {
         settings.coding.independent_every = self.independent_every;
         settings.coding.lambda = self.lambda.unwrap_or(settings.coding.lambda);
         // The other searches look for what a bit is worth themselves.
-        let spares = self.lambda.is_none() && matches!(self.goal, Goal::AsSet | Goal::Ram(_));
+        let spares = self.lambda.is_none() && matches!(self.goal, None | Some(Goal::Ram(_)));
         settings.sparing = if spares { Sparing::Unseen } else { Sparing::Nothing };
         let wide = if width > VAST { 32 } else { 16 };
         settings.cell = self.cell.unwrap_or(if width > WIDE { wide } else { settings.cell });
@@ -129,7 +126,7 @@ impl Options {
 
     /// The budget of bytes that is to be kept, if that is the goal.
     pub(crate) fn budget(&self) -> Option<u64> {
-        if let Goal::Budget(budget) = self.goal { Some(budget) } else { None }
+        if let Some(Goal::Budget(budget)) = self.goal { Some(budget) } else { None }
     }
 
     /// What else helps where a search finds nothing: to leave to it what is given; nothing where nothing is. `cells`: the search would try other

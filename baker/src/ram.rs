@@ -227,7 +227,7 @@ mod tests {
     }
 
     fn bake(room: Option<usize>, options: Options) -> Result<(usize, Vec<u8>, Report), BakeError> {
-        let goal = room.map_or(Goal::AsSet, Goal::Ram);
+        let goal = room.map(Goal::Ram);
         let (bytes, report) = bake_scene(&small(), &Options { goal, truth: TruthFrames::None, ..options }, &|_, _| {})?;
         let memory = Bundle::parse(&bytes).unwrap().memory_needed();
         assert_eq!(report.memory.workspace, memory);

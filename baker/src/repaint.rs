@@ -88,23 +88,23 @@ impl Painter {
         Self { frames, pictures }
     }
 
-    /// Gives `made`, and the source image that it came from, colours that suit what it shows, where there are better ones and it reaches `goal` with
+    /// Gives `made`, and the source image that it came from, colours that suit what it shows, where there are better ones and it reaches `goal`, if any, with
     /// them: whether it has them now.
     ///
     /// # Errors
     /// [`VerifyError`] where the player refuses the bytes.
-    pub(crate) fn repaint(&self, made: &mut Made, atlas: &mut Atlas, goal: Goal) -> Result<bool, VerifyError> {
+    pub(crate) fn repaint(&self, made: &mut Made, atlas: &mut Atlas, goal: Option<Goal>) -> Result<bool, VerifyError> {
         // Fewer colours take fewer bytes, which a budget may ask for.
         let (all, before) = (made.settings.atlas.colours, atlas.image.palette.len());
         let fewer = (0..).map(|halvings| before >> halvings).take_while(|&colours| colours >= FEW);
-        for colours in std::iter::once(all).chain(fewer.filter(|_| matches!(goal, Goal::Budget(_)))) {
+        for colours in std::iter::once(all).chain(fewer.filter(|_| matches!(goal, Some(Goal::Budget(_))))) {
             let settings = atlas::Settings { colours, ..made.settings.atlas };
             let Some((bundle, image)) = self.painted(&made.encoded.bundle, &atlas.image, &settings)? else { break };
-            if matches!(goal, Goal::Budget(most) if bundle.len() as u64 > most) {
+            if matches!(goal, Some(Goal::Budget(most)) if bundle.len() as u64 > most) {
                 continue;
             }
             let quality = verify::briefly(&bundle, &image, &atlas.gbuffer)?;
-            if matches!(goal, Goal::Psnr(least) if quality.psnr_mean < least) {
+            if matches!(goal, Some(Goal::Psnr(least)) if quality.psnr_mean < least) {
                 break;
             }
             (made.encoded.bundle, made.quality, atlas.image) = (bundle, quality, image);
@@ -183,7 +183,7 @@ mod tests {
         (scene, flat.atlas, made)
     }
 
-    fn repainted(scene: &Scene, atlas: &mut Atlas, made: &mut Made, goal: Goal) -> bool {
+    fn repainted(scene: &Scene, atlas: &mut Atlas, made: &mut Made, goal: Option<Goal>) -> bool {
         Painter::new(&Cast::new(scene, &|_, _| {}), &|_, _| {}).repaint(made, atlas, goal).unwrap()
     }
 
@@ -210,7 +210,7 @@ mod tests {
         for (name, least) in [("round-columns", 1.0), ("terrain", 1.0), ("pivot", 0.2)] {
             let (scene, mut atlas, mut made) = small(name);
             let (before, bundle, image) = (against_truth(&scene, &made), made.encoded.bundle.clone(), atlas.image.clone());
-            assert!(repainted(&scene, &mut atlas, &mut made, Goal::AsSet), "{name}");
+            assert!(repainted(&scene, &mut atlas, &mut made, None), "{name}");
             let after = against_truth(&scene, &made);
             assert!(after > before + least, "{name}: {before} {after}");
             let of = |bytes: &[u8]| {
@@ -236,9 +236,9 @@ mod tests {
         let (scene, mut atlas, mut made) = small("pyramid");
         let (bundle, quality, texels) = (made.encoded.bundle.clone(), made.quality, atlas.image.texels.clone());
         for goal in [Goal::Budget(10), Goal::Psnr(99.0)] {
-            assert!(!repainted(&scene, &mut atlas, &mut made, goal), "{goal:?}");
+            assert!(!repainted(&scene, &mut atlas, &mut made, Some(goal)), "{goal:?}");
             assert!(made.encoded.bundle == bundle && made.quality == quality && atlas.image.texels == texels, "{goal:?}");
         }
-        assert!(repainted(&scene, &mut atlas, &mut made, Goal::Budget(1 << 20)) && made.encoded.bundle != bundle);
+        assert!(repainted(&scene, &mut atlas, &mut made, Some(Goal::Budget(1 << 20))) && made.encoded.bundle != bundle);
     }
 }

@@ -14,6 +14,7 @@ use crate::samples::Samples;
 use crate::scene::Scene;
 use crate::terminal::grouped;
 use crate::verify;
+use std::cell::Cell;
 use std::time::Instant;
 
 /// Cells tried at first, pixels.
@@ -80,11 +81,6 @@ pub(crate) fn search(
         Goal::Budget(budget) => search.budget(budget)?,
         Goal::Psnr(asked) => search.psnr(asked)?,
         Goal::Ram(room) => search.ram(room, whole)?,
-        Goal::AsSet => {
-            let settings = options.settings(scene.playback.width);
-            let flat = search.flat(settings.atlas)?;
-            search.finish(flat, settings, Vec::new())?
-        }
     };
     let kept = chosen.flat.atlas_seconds + chosen.encoded.seconds;
     chosen.search_seconds = (start.elapsed().as_secs_f64() - kept).max(0.0);
@@ -342,11 +338,12 @@ impl Search<'_> {
     /// The smallest bundle whose mean PSNR against exact rays reaches `asked`.
     fn psnr(&self, asked: f64) -> Result<Chosen, BakeError> {
         let mut source = self.options.source();
-        let steps = self.grids(source).len() + STEPS;
+        let ratios: Vec<f64> = DENSITIES.into_iter().filter(|&ratio| ratio == 1.0 || ratio < 0.8).collect();
+        let steps = Cell::new(self.grids(source).len() + STEPS);
         let (mut step, mut nearest, mut room, mut exceeded) = (0, 0.0f64, MOST_MEMORY, None);
         // Of bundles that reach it the smaller one counts, of those that do not the better one.
         let mut score = |flat: &Flat, settings: &Settings, first: bool| -> Result<Option<f64>, BakeError> {
-            self.say(step, steps);
+            self.say(step, steps.get());
             step += 1;
             let Some(Encoded { bundle, .. }) = possible(self.encode(flat, settings), &mut exceeded)? else { return Ok(None) };
             let painted = self.painter.map_or(Ok(None), |painter| painter.painted(&bundle, &flat.atlas.image, &settings.atlas))?;
@@ -366,7 +363,11 @@ impl Search<'_> {
         };
         let free = Free { time: false, space: false, ..self.free() };
         let mut best: Option<(Settings, f64)> = None;
-        for (turn, ratio) in DENSITIES.into_iter().enumerate().filter(|&(turn, ratio)| turn == 0 || ratio < 0.8) {
+        for (turn, &ratio) in ratios.iter().enumerate() {
+            if turn == 1 {
+                // A coarser picture is rarely asked for: only then there is one more try for each, and steps from the one that does.
+                steps.set(steps.get() + ratios.len() - 1 + STEPS);
+            }
             let wanted = atlas::Settings { density: source.density * ratio, ..source };
             let flat = self.flat(wanted)?;
             if turn == 0 {
@@ -440,7 +441,7 @@ mod tests {
     fn a_budget_is_kept_and_more_of_it_is_no_worse() {
         let scene = small("cone-orbit");
         let bake = |budget| {
-            let options = Options { goal: Goal::Budget(budget), truth: TruthFrames::All, ..Options::default() };
+            let options = Options { goal: Some(Goal::Budget(budget)), truth: TruthFrames::All, ..Options::default() };
             bake_scene(&scene, &options, &|_, _| {})
         };
         let (bytes, small) = bake(6_000).unwrap();
@@ -460,8 +461,8 @@ mod tests {
             let options = Options { goal, storage, cell: Some(8), truth: TruthFrames::All, ..Options::default() };
             bake_scene(&scene, &options, &|_, _| {}).unwrap()
         };
-        let (plain, usual) = bake(Goal::AsSet, None);
-        let tight = Goal::Budget(plain.len() as u64 * 45 / 100);
+        let (plain, usual) = bake(None, None);
+        let tight = Some(Goal::Budget(plain.len() as u64 * 45 / 100));
         let told = |report: &crate::Report| report.warnings.iter().any(|warning| warning.contains("--storage raw"));
         let (bytes, open) = bake(tight, None);
         assert!(
@@ -477,7 +478,7 @@ mod tests {
         let psnr = |report: &crate::Report| report.quality_vs_truth.unwrap().psnr_mean;
         assert!(psnr(&open) > psnr(&raw), "{} {}", psnr(&open), psnr(&raw));
         // Where there is room, flash is where the picture stays, and nothing is worse than it would be without a budget.
-        let (_, wide) = bake(Goal::Budget(plain.len() as u64 * 4), None);
+        let (_, wide) = bake(Some(Goal::Budget(plain.len() as u64 * 4)), None);
         assert!(wide.source_image.storage == Storage::Raw && !told(&wide));
         assert!(psnr(&wide) >= psnr(&usual), "{} {}", psnr(&wide), psnr(&usual));
     }
@@ -486,7 +487,7 @@ mod tests {
     fn a_quality_is_reached_or_the_nearest_is_named() {
         let scene = small("cone-orbit");
         let bake = |asked| {
-            let options = Options { goal: Goal::Psnr(asked), truth: TruthFrames::None, ..Options::default() };
+            let options = Options { goal: Some(Goal::Psnr(asked)), truth: TruthFrames::None, ..Options::default() };
             bake_scene(&scene, &options, &|_, _| {})
         };
         let (plain, report) = bake_scene(&scene, &Options::default(), &|_, _| {}).unwrap();
@@ -503,7 +504,7 @@ mod tests {
         // What was not given is not to blame.
         assert!(!error.to_string().contains("--cell"), "{error}");
         let options =
-            Options { goal: Goal::Psnr(98.0), cell: Some(16), key_interval: Some(4), truth: TruthFrames::None, ..Options::default() };
+            Options { goal: Some(Goal::Psnr(98.0)), cell: Some(16), key_interval: Some(4), truth: TruthFrames::None, ..Options::default() };
         let error = bake_scene(&scene, &options, &|_, _| {}).err().unwrap();
         assert!(error.to_string().ends_with("ask for less, or leave --cell and --key-interval to the search"), "{error}");
     }

@@ -4,26 +4,26 @@
 use crate::atlas::Storage;
 use crate::bake::BakeError;
 use crate::baked::Baked;
-use crate::options::{Goal, Options};
+use crate::options::Goal;
 use crate::seen::Seen;
 use crate::tune::MOST_MEMORY;
 
-/// What a search for the goal of `options` `found`, or the `usual` bundle, stored as it has to be, where that reaches the goal better: within a budget of
-/// bytes with more quality beside what is `seen`, or a quality with fewer bytes. In memory that searches would not take either it is no answer.
+/// What a search for `goal` `found`, or the `usual` bundle, stored as it has to be, where that reaches the goal better: within a budget of bytes with more
+/// quality beside what is `seen`, or a quality with fewer bytes. In memory that searches would not take either it is no answer. `asked`: how it is
+/// stored where nothing has to give.
 ///
 /// # Errors
 /// What the search came to, where the usual bundle does not reach the goal either; those of the player.
 pub(crate) fn or_found(
-    options: &Options,
+    (goal, asked): (Goal, Storage),
     seen: &Seen<'_>,
     found: Result<Baked, BakeError>,
     usual: impl FnOnce(Storage) -> Result<Baked, BakeError>,
 ) -> Result<Baked, BakeError> {
-    let goal = options.goal;
     let found = match found {
         // Whatever else is wrong is wrong with both.
         Err(error @ BakeError::Psnr { .. }) => {
-            return usual(options.source().storage).ok().filter(|usual| reaches(goal, usual)).ok_or(error);
+            return usual(asked).ok().filter(|usual| reaches(goal, usual)).ok_or(error);
         }
         found => found?,
     };
@@ -34,9 +34,9 @@ pub(crate) fn or_found(
     Ok(if wins { usual } else { found })
 }
 
-fn reaches(goal: Goal, usual: &Baked) -> bool {
+/// Whether the `usual` bundle reaches `goal`.
+pub(crate) fn reaches(goal: Goal, usual: &Baked) -> bool {
     match goal {
-        Goal::AsSet => true,
         Goal::Budget(most) => usual.bundle.len() as u64 <= most,
         Goal::Psnr(least) => usual.report.quality.psnr_mean >= least,
         Goal::Ram(room) => usual.report.memory.workspace <= room,
