@@ -24,7 +24,7 @@ fn scene(triangles: Vec<Triangle>, pose: Pose) -> Scene {
         name: "test".into(),
         triangles,
         materials: vec![Material::default()],
-        textures: Vec::new(),
+        textures: [].into(),
         background: Background::Colour([0; 3]),
         lights: Vec::new(),
         camera: Arc::new(Still(pose)),
@@ -143,7 +143,7 @@ fn cut_out_texels_are_passed_through() {
     let pose = Pose::look_at(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, DVec3::Y, 50.0);
     let mut s = scene(vec![triangle(front), triangle(front.map(|p| p - DVec3::Z))], pose);
     let texels = vec![[255; 4], [255, 255, 255, 0], [255, 255, 255, 0], [255; 4]];
-    s.textures.push(Texture { width: 2, height: 2, texels, wrap: [Wrap::Repeat; 2] });
+    s.textures = [Texture { width: 2, height: 2, texels, wrap: [Wrap::Repeat; 2] }].into();
     s.materials.push(Material { texture: Some(0), alpha_cutoff: Some(0.5), ..Default::default() });
     s.triangles[0].material = 1;
     let tracer = Tracer::new(&s);

@@ -27,7 +27,7 @@ fn scene(triangles: Vec<Triangle>, textures: Vec<Texture>, material: Material) -
         name: "test".into(),
         triangles,
         materials: vec![material],
-        textures,
+        textures: textures.into(),
         background: Background::Colour([32, 40, 48]),
         lights: Vec::new(),
         camera: Arc::new(Arc90 { radius: 4.0, height: 1.6 }),

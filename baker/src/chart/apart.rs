@@ -185,7 +185,7 @@ mod tests {
             name: "rods".into(),
             triangles: places.iter().flat_map(|&place| [[a, b, c], [a, c, d]].map(|corners| triangle(corners, place))).collect(),
             materials: vec![Material::default()],
-            textures: Vec::new(),
+            textures: [].into(),
             background: Background::Colour([32, 40, 48]),
             lights: Vec::new(),
             camera: Arc::new(Line { from: at(-0.2), to: at(0.2), aim: Aim::Direction(DVec3::NEG_Z), up: DVec3::Y, fov: 45.0 }),

@@ -56,7 +56,7 @@ pub(crate) fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneErr
         name: load::name(path),
         triangles: model.triangles,
         materials: model.materials,
-        textures: model.textures,
+        textures: model.textures.into(),
         background,
         lights,
         camera,

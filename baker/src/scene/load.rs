@@ -6,7 +6,6 @@ use super::model::{Model, bounding_sphere};
 use super::{Background, Light, Playback, Scene, SceneError, Up, builtin, file, gltf, obj, ply, stl};
 use crate::camera::Orbit;
 use glam::{DVec3, Vec3};
-use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -110,28 +109,37 @@ pub fn load_builtin(name: &str, overrides: &Overrides) -> Result<Scene, SceneErr
     Ok(scene)
 }
 
+/// Makes a model of a file's bytes, of the folder that the files it names lie in, and of a texture for where it names none. Errors tell the place in the
+/// file, and what to do.
+type Loader = fn(Vec<u8>, &Path, Option<&Path>) -> Result<Model, String>;
+
 /// Loads a model by its ending; `None` if it is no model's. `texture` is for a model whose file names none; `up` is Z in STL files unless given, else Y.
 pub(crate) fn model(path: &Path, texture: Option<&Path>, up: Option<Up>) -> Option<Result<Model, SceneError>> {
     let ending = path.extension()?.to_string_lossy().to_ascii_lowercase();
-    if let Some(what) = misnamed(path, &ending) {
-        return Some(Err(SceneError::Model { file: path.to_owned(), what }));
-    }
-    let loaded = match ending.as_str() {
-        "glb" | "gltf" => gltf::load(path, texture),
-        "obj" => obj::load(path, texture),
-        "ply" => ply::load(path, texture),
-        "stl" => stl::load(path, texture),
-        _ => return None,
+    let loader: Option<Loader> = match ending.as_str() {
+        "glb" | "gltf" => Some(gltf::load),
+        "obj" => Some(obj::load),
+        "ply" => Some(ply::load),
+        "stl" => Some(stl::load),
+        _ => None,
     };
+    let at_fault = |what| SceneError::Model { file: path.to_owned(), what };
+    let bytes = match crate::files::read(path) {
+        Ok(bytes) => bytes,
+        Err(what) => return loader.map(|_| Err(SceneError::Read { file: path.to_owned(), what })),
+    };
+    if let Some(what) = misnamed(&bytes, &ending) {
+        return Some(Err(at_fault(what)));
+    }
+    let folder = path.parent().unwrap_or(Path::new(""));
     let up = up.unwrap_or(if ending == "stl" { Up::Z } else { Up::Y });
-    Some(loaded.and_then(|m| m.finish().map_err(|what| SceneError::Model { file: path.to_owned(), what })).map(|m| m.stand(up)))
+    let loaded = loader?(bytes, folder, texture).and_then(Model::finish);
+    Some(loaded.map(|model| model.stand(up)).map_err(at_fault))
 }
 
 /// What is wrong with a model's name, if its first bytes are another format's.
-fn misnamed(path: &Path, ending: &str) -> Option<String> {
-    let mut head = Vec::new();
-    crate::files::open_to_read(path).ok()?.0.take(8).read_to_end(&mut head).ok()?;
-    let (kind, is) = match head.as_slice() {
+fn misnamed(bytes: &[u8], ending: &str) -> Option<String> {
+    let (kind, is) = match bytes {
         [b'g', b'l', b'T', b'F', ..] => ("a binary glTF", "glb"),
         [b'p', b'l', b'y', b'\n' | b'\r', ..] => ("a PLY", "ply"),
         _ => return None,
@@ -174,7 +182,7 @@ fn alone(path: &Path, overrides: &Overrides) -> Result<Scene, SceneError> {
         name: name(path),
         triangles: model.triangles,
         materials: model.materials,
-        textures: model.textures,
+        textures: model.textures.into(),
         background: Background::Colour(BACKGROUND),
         lights,
         camera,

@@ -71,7 +71,7 @@ impl Default for Material {
 }
 
 /// How texture coordinates outside 0..1 are brought back.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default, Hash)]
 pub enum Wrap {
     /// Repeat.
     #[default]
@@ -148,7 +148,7 @@ pub struct Scene {
     /// Materials; at least one.
     pub materials: Vec<Material>,
     /// Base colour textures.
-    pub textures: Vec<Texture>,
+    pub textures: Arc<[Texture]>,
     /// Behind everything.
     pub background: Background,
     /// No light: everything is unlit.

@@ -1,24 +1,22 @@
 //! Wavefront OBJ and its MTL files, through `tobj`, after a pass over the text that says in which line something is wrong.
 //! Files come from `load`; models go back there.
 
-use super::error::{SceneError, Warnings};
+use super::error::Warnings;
 use super::model::{MAX_TRIANGLES, Model, too_many};
 use super::mtl::{self, Trouble, map_name};
 use super::{Material, Texture, Triangle, Wrap, picture, polygon};
 use crate::files::{beside, read as read_file};
 use glam::{DVec3, Vec2, Vec3};
 use std::cell::RefCell;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-/// Loads an .obj file; `texture` serves a file whose materials name none.
-pub(crate) fn load(path: &Path, texture: Option<&Path>) -> Result<Model, SceneError> {
-    let bytes = read_file(path).map_err(|what| SceneError::Read { file: path.to_owned(), what })?;
-    let error = |what| SceneError::Model { file: path.to_owned(), what };
+/// Loads an .obj file from `folder`; `texture` serves a file whose materials name none.
+pub(crate) fn load(bytes: Vec<u8>, folder: &Path, texture: Option<&Path>) -> Result<Model, String> {
     if bytes.starts_with(b"\xfe\xff") || bytes.starts_with(b"\xff\xfe") {
-        return Err(error("text in UTF-16; expected UTF-8: save it as that".to_owned()));
+        return Err("text in UTF-16; expected UTF-8: save it as that".to_owned());
     }
-    model(&mtl::text(&bytes), path.parent().unwrap_or(Path::new("")), texture).map_err(error)
+    model(&mtl::text(&bytes), folder, texture)
 }
 
 fn model(text: &str, folder: &Path, fallback: Option<&Path>) -> Result<Model, String> {
@@ -66,20 +64,15 @@ fn model(text: &str, folder: &Path, fallback: Option<&Path>) -> Result<Model, St
 /// Vertices farther from the origin than this are told from the first one: `tobj` holds them in 24 bits.
 const FAR: f64 = 4096.0;
 
+/// What the corners of faces name, in the order in which they do.
+const NAMED: [&str; 3] = ["vertices", "texture coordinates", "normals"];
+
 /// Checks every line that matters and hands back a text that `tobj` takes as it is meant: lines joined, extras dropped; and where its vertices are
 /// counted from.
 fn check(text: &str, warnings: &mut Warnings) -> Result<(String, DVec3), String> {
-    let (mut libraries, mut origin) = (String::new(), DVec3::ZERO);
-    let mut clean = String::with_capacity(text.len());
-    // Number 1 of each stands for "none": left to itself, `tobj` gives such corners the ones of the corner before.
-    clean.push_str("vt 0 1\nvn 0 0 0\n");
-    let (mut vertices, mut coloured, mut uvs, mut normals, mut triangles) = (0i64, 0i64, 0i64, 0i64, 0usize);
-    let mut positions = Vec::new();
+    let mut checked = Checked::new(text.len());
     let mut lines = text.lines().enumerate();
-    // Forward references are allowed: absolute indices are held against the whole file at the end.
-    let mut highest = [(0i64, 0usize); 3];
     while let Some((number, line)) = lines.next() {
-        let place = number + 1;
         let mut line = line.to_owned();
         // A comment goes no further than its line.
         while line.ends_with('\\') && !line.contains('#') {
@@ -87,121 +80,172 @@ fn check(text: &str, warnings: &mut Warnings) -> Result<(String, DVec3), String>
             line.push(' ');
             line.push_str(lines.next().map_or("", |l| l.1));
         }
-        let whole = line.trim();
+        checked.line(number + 1, line.trim(), warnings)?;
+    }
+    checked.finished(warnings)
+}
+
+/// What was found in the lines of a text that have been checked.
+struct Checked {
+    /// The lines for `tobj`.
+    clean: String,
+    /// Those that name libraries, which come before the others: wherever such a line stands, it is about all of the file.
+    libraries: String,
+    /// Where vertices are counted from.
+    origin: DVec3,
+    positions: Vec<DVec3>,
+    /// How many vertices have colours.
+    coloured: i64,
+    /// How many there are of each of [`NAMED`].
+    counts: [i64; 3],
+    /// The highest index into each, and its line. Indices may run ahead of what they name: they are held against the whole file at the end.
+    highest: [(i64, usize); 3],
+    triangles: usize,
+}
+
+impl Checked {
+    /// Nothing yet, with room for a text of `length` bytes.
+    fn new(length: usize) -> Self {
+        let mut clean = String::with_capacity(length);
+        // Number 1 of each stands for "none": left to itself, `tobj` gives such corners the ones of the corner before.
+        clean.push_str("vt 0 1\nvn 0 0 0\n");
+        Self {
+            clean,
+            libraries: String::new(),
+            origin: DVec3::ZERO,
+            positions: Vec::new(),
+            coloured: 0,
+            counts: [0; 3],
+            highest: [(0, 0); 3],
+            triangles: 0,
+        }
+    }
+
+    /// Takes `whole`, which begins in line `place`, with its comment.
+    fn line(&mut self, place: usize, whole: &str, warnings: &mut Warnings) -> Result<(), String> {
         let line = whole.split('#').next().unwrap_or("").trim();
         let (word, rest) = line.split_once(char::is_whitespace).unwrap_or((line, ""));
-        let number = |word: &str| word.parse::<f64>().ok().filter(|v| (*v as f32).is_finite());
-        let numbers = || rest.split_whitespace().map(number).collect::<Option<Vec<f64>>>();
+        let numbers = |least: usize| {
+            let number = |word: &str| word.parse::<f64>().ok().filter(|v| (*v as f32).is_finite());
+            let all = rest.split_whitespace().map(number).collect::<Option<Vec<f64>>>();
+            all.filter(|all| all.len() >= least).ok_or_else(|| format!("line {place}: \"{line}\"; expected at least {least} numbers"))
+        };
         match word {
-            "v" | "vt" | "vn" => {
-                let least = if word == "vt" { 1 } else { 3 };
-                let v = numbers()
-                    .filter(|v| v.len() >= least)
-                    .ok_or_else(|| format!("line {place}: \"{line}\"; expected at least {least} numbers"))?;
-                match word {
-                    "v" => {
-                        vertices += 1;
-                        let at = DVec3::from_slice(&v[..3]);
-                        if vertices == 1 && at.abs().max_element() > FAR {
-                            origin = at.round();
-                        }
-                        let from = (at - origin).as_vec3();
-                        positions.push(from.as_dvec3());
-                        coloured += i64::from(v.len() >= 6);
-                        clean.push_str(&format!("v {} {} {}", from.x, from.y, from.z));
-                        if let [_, _, _, r, g, b, ..] = v[..] {
-                            clean.push_str(&format!(" {r} {g} {b}"));
-                        }
-                    }
-                    "vt" => {
-                        uvs += 1;
-                        clean.push_str(&format!("vt {} {}", v[0], v.get(1).copied().unwrap_or(0.0)));
-                    }
-                    _ => {
-                        normals += 1;
-                        clean.push_str(&format!("vn {} {} {}", v[0], v[1], v[2]));
-                    }
-                }
+            "v" => self.vertex(&numbers(3)?),
+            "vt" => {
+                let v = numbers(1)?;
+                self.counts[1] += 1;
+                self.clean.push_str(&format!("vt {} {}\n", v[0], v.get(1).copied().unwrap_or(0.0)));
             }
-            "f" => {
-                let mut corners = 0;
-                let start = clean.len();
-                clean.push('f');
-                for corner in rest.split_whitespace() {
-                    corners += 1;
-                    let mut parsed = [0i64; 3];
-                    for (i, part) in corner.split('/').enumerate() {
-                        let odd = || format!("line {place}: \"{corner}\"; expected v, v/vt, v//vn or v/vt/vn");
-                        let (what, count) =
-                            [("vertices", vertices), ("texture coordinates", uvs), ("normals", normals)].get(i).copied().ok_or_else(odd)?;
-                        if part.is_empty() && i > 0 {
-                            continue;
-                        }
-                        let index: i64 = part.parse().map_err(|_| odd())?;
-                        if index == 0 || index < -count {
-                            return Err(format!("line {place}: index {index} of {count} {what} so far"));
-                        }
-                        parsed[i] = if index < 0 { count + 1 + index } else { index };
-                        if parsed[i] > highest[i].0 {
-                            highest[i] = (parsed[i], place);
-                        }
-                    }
-                    clean.push_str(&format!(" {}/{}/{}", parsed[0], parsed[1].saturating_add(1), parsed[2].saturating_add(1)));
-                }
-                if corners < 2 {
-                    return Err(format!("line {place}: a face of {corners} corners; expected at least 3"));
-                }
-                // As old exporters write loose edges.
-                if corners == 2 {
-                    clean.truncate(start);
-                    warnings.add("faces of two corners are not shown");
-                    continue;
-                }
-                triangles += corners - 2;
+            "vn" => {
+                let v = numbers(3)?;
+                self.counts[2] += 1;
+                self.clean.push_str(&format!("vn {} {} {}\n", v[0], v[1], v[2]));
             }
-            "l" | "p" => {
-                warnings.add("points and lines are not shown: only faces are");
+            "f" => self.face(place, rest, warnings)?,
+            "l" | "p" => warnings.add("points and lines are not shown: only faces are"),
+            "mtllib" | "usemtl" | "o" | "g" => self.named(word, mtl::name(whole)),
+            "curv" | "curv2" | "surf" => warnings.add("free-form curves and surfaces are not shown: export polygons"),
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// A vertex: its position and, if there are as many numbers, its colour.
+    fn vertex(&mut self, v: &[f64]) {
+        self.counts[0] += 1;
+        let at = DVec3::from_slice(&v[..3]);
+        if self.counts[0] == 1 && at.abs().max_element() > FAR {
+            self.origin = at.round();
+        }
+        let from = (at - self.origin).as_vec3();
+        self.positions.push(from.as_dvec3());
+        self.clean.push_str(&format!("v {} {} {}", from.x, from.y, from.z));
+        if let [_, _, _, r, g, b, ..] = v {
+            self.coloured += 1;
+            self.clean.push_str(&format!(" {r} {g} {b}"));
+        }
+        self.clean.push('\n');
+    }
+
+    /// A face with these corners.
+    fn face(&mut self, place: usize, corners: &str, warnings: &mut Warnings) -> Result<(), String> {
+        let (mut count, mut line) = (0, "f".to_owned());
+        for corner in corners.split_whitespace() {
+            let [v, vt, vn] = self.corner(place, corner)?;
+            line.push_str(&format!(" {v}/{}/{}", vt.saturating_add(1), vn.saturating_add(1)));
+            count += 1;
+        }
+        match count {
+            0 | 1 => return Err(format!("line {place}: a face of {count} corners; expected at least 3")),
+            // As old exporters write loose edges.
+            2 => warnings.add("faces of two corners are not shown"),
+            _ => {
+                self.triangles += count - 2;
+                self.clean.extend([&line, "\n"]);
+            }
+        }
+        Ok(())
+    }
+
+    /// What a corner names, counted from 1; 0 for what it leaves out.
+    fn corner(&mut self, place: usize, corner: &str) -> Result<[i64; 3], String> {
+        let odd = || format!("line {place}: \"{corner}\"; expected v, v/vt, v//vn or v/vt/vn");
+        let mut indices = [0; 3];
+        for (i, part) in corner.split('/').enumerate() {
+            let count = *self.counts.get(i).ok_or_else(odd)?;
+            if part.is_empty() && i > 0 {
                 continue;
             }
-            "mtllib" | "usemtl" | "o" | "g" => match (word, mtl::name(whole)) {
-                ("mtllib" | "usemtl", "") => continue,
-                // Wherever it stands, it is about all of the file.
-                ("mtllib", name) => {
-                    libraries.push_str(&format!("mtllib {name}\n"));
-                    continue;
-                }
-                (_, "") => clean.push_str(word),
-                (_, name) => clean.push_str(&format!("{word} {name}")),
-            },
-            "curv" | "curv2" | "surf" => {
-                warnings.add("free-form curves and surfaces are not shown: export polygons");
-                continue;
+            let index: i64 = part.parse().map_err(|_| odd())?;
+            if index == 0 || index < -count {
+                return Err(format!("line {place}: index {index} of {count} {} so far", NAMED[i]));
             }
-            _ => continue,
+            indices[i] = if index < 0 { count + 1 + index } else { index };
+            if indices[i] > self.highest[i].0 {
+                self.highest[i] = (indices[i], place);
+            }
         }
-        clean.push('\n');
+        Ok(indices)
     }
-    for ((highest, line), (count, what)) in highest.iter().zip([(vertices, "vertices"), (uvs, "texture coordinates"), (normals, "normals")])
-    {
-        if *highest > count {
-            return Err(format!("line {line}: index {highest} of {count} {what}"));
+
+    /// A line whose first word comes before a name, which may be missing.
+    fn named(&mut self, word: &str, name: &str) {
+        match (word, name) {
+            ("mtllib" | "usemtl", "") => {}
+            ("mtllib", name) => self.libraries.push_str(&format!("mtllib {name}\n")),
+            (word, "") => self.clean.extend([word, "\n"]),
+            (word, name) => self.clean.push_str(&format!("{word} {name}\n")),
         }
     }
-    if triangles > MAX_TRIANGLES {
-        return Err(too_many(triangles));
+
+    /// The whole text, and where its vertices are counted from.
+    fn finished(self, warnings: &mut Warnings) -> Result<(String, DVec3), String> {
+        for (((highest, line), count), what) in self.highest.into_iter().zip(self.counts).zip(NAMED) {
+            if highest > count {
+                return Err(format!("line {line}: index {highest} of {count} {what}"));
+            }
+        }
+        if self.triangles > MAX_TRIANGLES {
+            return Err(too_many(self.triangles));
+        }
+        let clean = self.libraries + &cut(&self.clean, &self.positions);
+        let (coloured, vertices) = (self.coloured, self.counts[0]);
+        if coloured > 0 && coloured < vertices {
+            warnings.add(format!("only {coloured} of {vertices} vertices have colours: they are ignored"));
+            return Ok((without_colours(&clean), self.origin));
+        }
+        Ok((clean, self.origin))
     }
-    let mut clean = libraries + &cut(&clean, &positions);
-    if coloured > 0 && coloured < vertices {
-        warnings.add(format!("only {coloured} of {vertices} vertices have colours: they are ignored"));
-        clean = clean
-            .lines()
-            .map(|l| match l.strip_prefix("v ") {
-                Some(rest) => format!("v {}\n", rest.split(' ').take(3).collect::<Vec<_>>().join(" ")),
-                None => format!("{l}\n"),
-            })
-            .collect();
-    }
-    Ok((clean, origin))
+}
+
+/// The same text, vertices without their colours.
+fn without_colours(text: &str) -> String {
+    let plain = |line: &str| match line.strip_prefix("v ") {
+        Some(numbers) => format!("v {}\n", numbers.split(' ').take(3).collect::<Vec<_>>().join(" ")),
+        None => format!("{line}\n"),
+    };
+    text.lines().map(plain).collect()
 }
 
 /// The same text with polygons that are no fans cut into triangles: `tobj` makes fans of all.
@@ -228,45 +272,41 @@ fn cut(text: &str, positions: &[DVec3]) -> String {
     whole
 }
 
-/// The textures decoded so far, by what names them.
+/// The textures decoded so far, and which of them a colour's file and a mask's make.
 #[derive(Default)]
 struct Shelf {
     all: Vec<Texture>,
-    names: Vec<(PathBuf, Option<PathBuf>)>,
+    known: HashMap<(PathBuf, Option<PathBuf>), u32>,
 }
 
 impl Shelf {
     fn get(&mut self, colour: PathBuf, mask: Option<PathBuf>) -> Result<u32, String> {
         let key = (colour, mask);
-        if let Some(i) = self.names.iter().position(|n| *n == key) {
-            return Ok(i as u32);
+        if let Some(&known) = self.known.get(&key) {
+            return Ok(known);
         }
         let read = |path: &Path| {
             let decoded = read_file(path).and_then(|b| picture::texture(&b, [Wrap::Repeat; 2], &self.all));
             decoded.map_err(|e| format!("texture {}: {e}", path.display()))
         };
         let mut texture = read(&key.0)?;
-        match &key.1 {
-            // One picture for both: the mask is its alpha, if it has any.
-            Some(mask) if *mask == key.0 => {}
-            Some(mask) => {
-                let mask = read(mask)?;
-                for y in 0..texture.height {
-                    for x in 0..texture.width {
-                        let (i, j) = (
-                            x as u64 * u64::from(mask.width) / u64::from(texture.width),
-                            y as u64 * u64::from(mask.height) / u64::from(texture.height),
-                        );
-                        let from = mask.texels[(j * u64::from(mask.width) + i) as usize];
-                        texture.texels[y as usize * texture.width as usize + x as usize][3] = from[0];
-                    }
-                }
-            }
-            None => {}
+        // One picture for both: the mask is its alpha, if it has any.
+        if let Some(mask) = key.1.as_ref().filter(|mask| **mask != key.0) {
+            cut_out(&mut texture, &read(mask)?);
         }
+        let at = self.all.len() as u32;
         self.all.push(texture);
-        self.names.push(key);
-        Ok(self.all.len() as u32 - 1)
+        self.known.insert(key, at);
+        Ok(at)
+    }
+}
+
+/// Takes the alpha of `texture` from the red of `mask`, which may be of another size.
+fn cut_out(texture: &mut Texture, mask: &Texture) {
+    let [width, height, across, down] = [texture.width, texture.height, mask.width, mask.height].map(u64::from);
+    let places = (0..height).flat_map(|y| (0..width).map(move |x| [x, y]));
+    for (texel, [x, y]) in texture.texels.iter_mut().zip(places) {
+        texel[3] = mask.texels[(y * down / height * across + x * across / width) as usize][0];
     }
 }
 

@@ -1,7 +1,6 @@
 //! PLY, ASCII or binary of either byte order, with vertex colours, through `ply-rs-bw`.
 //! Files come from `load`; models go back there.
 
-use super::error::SceneError;
 use super::model::{MAX_TRIANGLES, Model, too_many};
 use super::{Material, Triangle, Wrap, picture, polygon};
 use crate::files::{beside, read as read_file};
@@ -10,10 +9,9 @@ use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType, ScalarType};
 use std::path::Path;
 
-/// Loads a .ply file; `texture` serves a file that names none.
-pub(crate) fn load(path: &Path, texture: Option<&Path>) -> Result<Model, SceneError> {
-    let bytes = read_file(path).map_err(|what| SceneError::Read { file: path.to_owned(), what })?;
-    model(&bytes, path.parent().unwrap_or(Path::new("")), texture).map_err(|what| SceneError::Model { file: path.to_owned(), what })
+/// Loads a .ply file from `folder`; `texture` serves a file that names none.
+pub(crate) fn load(bytes: Vec<u8>, folder: &Path, texture: Option<&Path>) -> Result<Model, String> {
+    model(&bytes, folder, texture)
 }
 
 /// A vertex, with whatever properties the file gives it.

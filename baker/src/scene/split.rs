@@ -14,7 +14,8 @@ const MOST: usize = 20_000;
 /// Times that an edge is cut in half, at most.
 const ROUNDS: usize = 16;
 
-/// `scene` with large triangles split; `None` where there are none, or too many. Triangles that share an edge are cut at the same point of it.
+/// `scene` with large triangles split; `None` where there are none, or too many. Triangles that share an edge are cut at the same point of it. Textures and
+/// the camera are those of `scene`, not copies.
 pub(crate) fn split(scene: &Scene) -> Option<Scene> {
     let eyes = Eyes::new(scene);
     let most = scene.triangles.len() + MOST;
@@ -34,7 +35,17 @@ pub(crate) fn split(scene: &Scene) -> Option<Scene> {
         let Some(smaller) = parts(&triangles) else { break };
         triangles = smaller;
     }
-    Some(Scene { triangles, ..scene.clone() })
+    Some(Scene {
+        name: scene.name.clone(),
+        triangles,
+        materials: scene.materials.clone(),
+        textures: scene.textures.clone(),
+        background: scene.background.clone(),
+        lights: scene.lights.clone(),
+        camera: scene.camera.clone(),
+        playback: scene.playback,
+        warnings: scene.warnings.clone(),
+    })
 }
 
 /// Where the camera is, and the box around that.
@@ -138,7 +149,7 @@ mod tests {
             name: "floor".to_owned(),
             triangles: vec![triangle([a, d, c]), triangle([a, c, b])],
             materials: vec![Material::default()],
-            textures: Vec::new(),
+            textures: [].into(),
             background: Background::Colour([0; 3]),
             lights: Vec::new(),
             camera: Arc::new(Line { from: DVec3::new(1.0, height, 8.0), to: DVec3::new(1.0, height, -8.0), aim, up: DVec3::Y, fov: 60.0 }),

@@ -1,10 +1,8 @@
 //! STL, binary or text, through `stl_io`. It knows triangles alone: no colours, no smooth normals, no units.
 //! Files come from `load`; models go back there.
 
-use super::error::SceneError;
 use super::model::{MAX_TRIANGLES, Model, too_many};
 use super::{Material, Triangle};
-use crate::files::read as read_file;
 use glam::{DVec3, Vec2, Vec3};
 use std::io::Cursor;
 use std::path::Path;
@@ -13,10 +11,9 @@ use std::path::Path;
 const HEAD: usize = 84;
 const EACH: usize = 50;
 
-/// Loads an .stl file; a `texture` is of no use to it, and that is told.
-pub(crate) fn load(path: &Path, texture: Option<&Path>) -> Result<Model, SceneError> {
-    let bytes = read_file(path).map_err(|what| SceneError::Read { file: path.to_owned(), what })?;
-    let mut model = model(bytes).map_err(|what| SceneError::Model { file: path.to_owned(), what })?;
+/// Loads an .stl file, which names no others; a `texture` is of no use to it, and that is told.
+pub(crate) fn load(bytes: Vec<u8>, _folder: &Path, texture: Option<&Path>) -> Result<Model, String> {
+    let mut model = model(bytes)?;
     if let Some(texture) = texture {
         model.warnings.add(format!("texture {} is not used: STL has no texture coordinates", texture.display()));
     }

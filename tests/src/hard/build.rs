@@ -119,7 +119,7 @@ impl Build {
             name: name.to_owned(),
             triangles: self.triangles.clone(),
             materials: PAINTS.map(material).to_vec(),
-            textures: vec![paint()],
+            textures: [paint()].into(),
             background: Background::Colour([40, 48, 64]),
             lights: Vec::new(),
             camera: Arc::new(Along(path)),

@@ -176,7 +176,7 @@ impl Builder {
             name: name.to_owned(),
             triangles: self.triangles,
             materials: vec![Material { texture: Some(0), unlit: true, ..Material::default() }],
-            textures: vec![Texture { width: self.width, height: self.height, texels, wrap: [Wrap::Clamp; 2] }],
+            textures: [Texture { width: self.width, height: self.height, texels, wrap: [Wrap::Clamp; 2] }].into(),
             background: Background::Colour([150, 180, 222]),
             lights: Vec::new(),
             camera: Arc::new(Along(path)),

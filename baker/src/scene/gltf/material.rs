@@ -11,6 +11,7 @@ use ::gltf::json::material::AlphaMode;
 use ::gltf::json::texture::WrappingMode;
 use ::gltf::json::validation::Checked;
 use glam::{Affine2, Mat2, Vec2, Vec3};
+use std::collections::HashMap;
 use std::path::Path;
 
 /// Which texture coordinates a material wants, and what it does to them.
@@ -25,7 +26,7 @@ pub(crate) struct Mapping {
 /// Appends every material of the file to `model`, and one more for primitives without. A material's mapping has
 /// the same index; `None`: no texture.
 pub(crate) fn load(data: Data<'_>, folder: &Path, fallback: Option<&Path>, model: &mut Model) -> Result<Vec<Option<Mapping>>, String> {
-    let mut shelf = Shelf { data, folder, known: Vec::new(), lowest: Vec::new() };
+    let mut shelf = Shelf { data, folder, known: HashMap::new(), lowest: Vec::new() };
     let mut mappings = Vec::new();
     for (i, material) in data.root.materials.iter().enumerate() {
         let name = material.name.as_ref().map_or(format!("material {i}"), |n| format!("material \"{n}\""));
@@ -109,8 +110,8 @@ fn mapping(info: &json::texture::Info) -> Mapping {
 struct Shelf<'a> {
     data: Data<'a>,
     folder: &'a Path,
-    /// Image, wrap modes, index in the model.
-    known: Vec<(usize, [Wrap; 2], u32)>,
+    /// The index in the model of each image with its wrap modes.
+    known: HashMap<(usize, [Wrap; 2]), u32>,
     /// The least alpha of each texture of the model: many materials may ask for it.
     lowest: Vec<u8>,
 }
@@ -132,8 +133,8 @@ impl Shelf<'_> {
             }
             None => [Wrap::Repeat; 2],
         };
-        if let Some(known) = self.known.iter().find(|k| k.0 == source && k.1 == wrap) {
-            return Ok(Some(known.2));
+        if let Some(&known) = self.known.get(&(source, wrap)) {
+            return Ok(Some(known));
         }
         let image = root.images.get(source).ok_or_else(|| format!("texture {index}: image {source} of {}", root.images.len()))?;
         let what = image.name.as_ref().map_or(format!("image {source}"), |n| format!("image \"{n}\""));
@@ -146,7 +147,7 @@ impl Shelf<'_> {
         let at = model.textures.len() as u32;
         self.lowest.push(decoded.texels.iter().map(|texel| texel[3]).min().unwrap_or(255));
         model.textures.push(decoded);
-        self.known.push((source, wrap, at));
+        self.known.insert((source, wrap), at);
         Ok(Some(at))
     }
 }

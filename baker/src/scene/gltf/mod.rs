@@ -10,21 +10,15 @@ mod material;
 mod mesh;
 mod nodes;
 
-use super::error::SceneError;
 use super::model::Model;
-use crate::files::read as read_file;
 use accessor::Data;
 use std::path::Path;
 
-/// Loads a .gltf or .glb file; `texture` serves a file whose materials name none.
-pub(crate) fn load(path: &Path, texture: Option<&Path>) -> Result<Model, SceneError> {
-    let bytes = read_file(path).map_err(|what| SceneError::Read { file: path.to_owned(), what })?;
-    model(&bytes, path.parent().unwrap_or(Path::new("")), texture).map_err(|what| SceneError::Model { file: path.to_owned(), what })
-}
-
-fn model(bytes: &[u8], folder: &Path, texture: Option<&Path>) -> Result<Model, String> {
+/// Loads a .gltf or .glb file from `folder`; `texture` serves a file whose materials name none.
+pub(crate) fn load(bytes: Vec<u8>, folder: &Path, texture: Option<&Path>) -> Result<Model, String> {
     let mut model = Model::default();
-    let shell = document::parse(bytes, &mut model.warnings)?;
+    let shell = document::parse(&bytes, &mut model.warnings)?;
+    drop(bytes);
     let buffers = buffers::Buffers::load(&shell.root, shell.blob, folder)?;
     let data = Data { root: &shell.root, buffers: &buffers };
     check_images(data, folder)?;
