@@ -20,9 +20,16 @@ pub(crate) struct Numbers {
     pub count: usize,
     /// `width * count` numbers; normalised integers are brought to -1..=1 or 0..=1.
     pub values: Vec<f64>,
+    /// The first element with a number that is infinite or none.
+    pub bad: Option<usize>,
 }
 
 impl Numbers {
+    fn new(width: usize, count: usize, values: Vec<f64>) -> Self {
+        let bad = values.iter().position(|v| !v.is_finite()).map(|i| i / width.max(1));
+        Self { width, count, values, bad }
+    }
+
     /// Element `i`; missing ones are zero.
     pub fn element<const N: usize>(&self, i: usize) -> [f64; N] {
         let mut out = [0.0; N];
@@ -36,12 +43,7 @@ impl Numbers {
     /// These of the elements.
     pub fn picked(&self, elements: &[usize]) -> Self {
         let of = |&i: &usize| self.values.get(i * self.width..(i + 1) * self.width).unwrap_or(&[]);
-        Self { width: self.width, count: elements.len(), values: elements.iter().flat_map(of).copied().collect() }
-    }
-
-    /// The first element with a number that is infinite or none.
-    pub fn first_bad(&self) -> Option<usize> {
-        self.values.iter().position(|v| !v.is_finite()).map(|i| i / self.width.max(1))
+        Self::new(self.width, elements.len(), elements.iter().flat_map(of).copied().collect())
     }
 }
 
@@ -134,7 +136,7 @@ impl Data<'_> {
                 old.copy_from_slice(new);
             }
         }
-        Ok(Numbers { width, count, values })
+        Ok(Numbers::new(width, count, values))
     }
 
     fn dense(&self, view: usize, offset: u64, count: usize, shape: Type, format: Format) -> Result<Vec<f64>, String> {

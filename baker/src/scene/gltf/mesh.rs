@@ -11,7 +11,9 @@ use ::gltf::json;
 use ::gltf::json::accessor::Type;
 use ::gltf::json::mesh::{Mode, Semantic};
 use ::gltf::json::validation::Checked;
-use glam::{DMat3, DMat4, DVec3, DVec4, Vec2, Vec3};
+use glam::{Affine2, DMat3, DMat4, DVec3, DVec4, Vec2, Vec3};
+use std::collections::HashMap;
+use std::rc::Rc;
 
 /// A primitive, as its file has it.
 struct Primitive {
@@ -25,40 +27,26 @@ struct Primitive {
     material: usize,
 }
 
-impl Primitive {
-    /// The same without vertices that are no triangle's: primitives may share a file's vertices, of which each would hold all.
-    fn trimmed(mut self) -> Self {
-        if 3 * self.corners.len() >= self.positions.len() {
-            return self;
-        }
-        let (mut number, mut used) = (vec![u32::MAX; self.positions.len()], Vec::new());
-        for corner in self.corners.as_flattened_mut() {
-            let number = &mut number[*corner as usize];
-            if *number == u32::MAX {
-                *number = used.len() as u32;
-                used.push(*corner as usize);
-            }
-            *corner = *number;
-        }
-        fn picked<T: Copy>(all: &[T], used: &[usize]) -> Vec<T> {
-            used.iter().filter_map(|&i| all.get(i).copied()).collect()
-        }
-        let Self { positions, normals, uvs, colours, influences, corners, material } = self;
-        Self {
-            positions: picked(&positions, &used),
-            normals: picked(&normals, &used),
-            uvs: picked(&uvs, &used),
-            colours: picked(&colours, &used),
-            influences: influences.iter().map(|(joints, weights)| (joints.picked(&used), weights.picked(&used))).collect(),
-            corners,
-            material,
-        }
+/// The vertices that `corners` name, of `count`; corners then name places among these. Primitives may share a file's vertices, of which each would hold all.
+fn used(corners: &mut [[u32; 3]], count: usize) -> Vec<usize> {
+    if 3 * corners.len() >= count {
+        return (0..count).collect();
     }
+    let (mut places, mut used) = (HashMap::new(), Vec::new());
+    for corner in corners.as_flattened_mut() {
+        let vertex = *corner as usize;
+        *corner = *places.entry(vertex).or_insert_with(|| {
+            used.push(vertex);
+            used.len() as u32 - 1
+        });
+    }
+    used
 }
 
 /// Places every mesh of the scene.
 pub(crate) fn load(data: Data<'_>, nodes: &Nodes, mappings: &[Option<Mapping>], model: &mut Model) -> Result<(), String> {
     let root = data.root;
+    let mut reader = Reader { data, mappings, shared: Vec::new() };
     let mut known: Vec<Option<Vec<Primitive>>> = root.meshes.iter().map(|_| None).collect();
     for &n in &nodes.order {
         let node = &root.nodes[n];
@@ -71,7 +59,7 @@ pub(crate) fn load(data: Data<'_>, nodes: &Nodes, mappings: &[Option<Mapping>], 
             let mut primitives = Vec::new();
             for (i, p) in mesh.primitives.iter().enumerate() {
                 let where_ = format!("{what}: primitive {i}");
-                primitives.extend(read(data, p, mappings, &where_, &mut model.warnings).map_err(|e| format!("{where_}: {e}"))?);
+                primitives.extend(reader.read(p, &where_, &mut model.warnings).map_err(|e| format!("{where_}: {e}"))?);
             }
             *slot = Some(primitives);
         }
@@ -113,101 +101,158 @@ fn skin(data: Data<'_>, index: usize, nodes: &Nodes) -> Result<Vec<DMat4>, Strin
     skin.joints.iter().zip(bind).map(joint).collect()
 }
 
-/// Reads a primitive; `None` if it has no triangles to show.
-fn read(
-    data: Data<'_>,
-    p: &json::mesh::Primitive,
-    mappings: &[Option<Mapping>],
-    place: &str,
-    warnings: &mut Warnings,
-) -> Result<Option<Primitive>, String> {
-    let Checked::Valid(mode) = p.mode else { return Err("unknown mode; expected 0 to 6".to_owned()) };
-    if matches!(mode, Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
-        warnings.add(format!("{place}: {mode:?} are not shown: only triangles are"));
-        return Ok(None);
-    }
-    if p.targets.as_ref().is_some_and(|t| !t.is_empty()) {
-        warnings.add("morph targets are ignored: meshes keep their base shape");
-    }
-    let attribute = |semantic: Semantic, shapes: &[Type]| match p.attributes.get(&Checked::Valid(semantic.clone())) {
-        Some(a) => data.read(a.value(), shapes).map(Some).map_err(|e| format!("{}: {e}", attribute_name(&semantic))),
-        None => Ok(None),
-    };
-    let Some(positions) = attribute(Semantic::Positions, &[Type::Vec3])? else {
-        warnings.add(format!("{place}: has no POSITION and is not shown"));
-        return Ok(None);
-    };
-    if let Some(i) = positions.first_bad() {
-        return Err(format!("position {i} is {:?}; expected numbers", positions.element::<3>(i)));
-    }
-    let count = positions.count;
-    let same = |what: &str, n: &Numbers| match n.count {
-        c if c < count => Err(format!("{what}: {c} elements for {count} vertices")),
-        _ => match n.first_bad() {
-            Some(i) => Err(format!("{what}: element {i} is not a number")),
-            None => Ok(()),
-        },
-    };
-    let material = p.material.map_or(mappings.len() - 1, |m| m.value());
-    if material >= mappings.len() {
-        return Err(format!("material {material} of {}", mappings.len() - 1));
-    }
-    let normals = match attribute(Semantic::Normals, &[Type::Vec3])? {
+/// The numbers of an accessor that primitives may share.
+type Shared = Rc<Numbers>;
+
+/// Reads primitives, one after the other.
+struct Reader<'a> {
+    data: Data<'a>,
+    mappings: &'a [Option<Mapping>],
+    /// What the last primitive named, as what, and the numbers there: in many files one accessor has the vertices of all. What a primitive does not name is
+    /// dropped before it is read, so that there is never more in memory than one names.
+    shared: Vec<(Semantic, usize, Shared)>,
+}
+
+impl Reader<'_> {
+    /// Reads a primitive; `None` if it has no triangles to show.
+    fn read(&mut self, p: &json::mesh::Primitive, place: &str, warnings: &mut Warnings) -> Result<Option<Primitive>, String> {
+        let Checked::Valid(mode) = p.mode else { return Err("unknown mode; expected 0 to 6".to_owned()) };
+        if matches!(mode, Mode::Points | Mode::Lines | Mode::LineLoop | Mode::LineStrip) {
+            warnings.add(format!("{place}: {mode:?} are not shown: only triangles are"));
+            return Ok(None);
+        }
+        if p.targets.as_ref().is_some_and(|t| !t.is_empty()) {
+            warnings.add("morph targets are ignored: meshes keep their base shape");
+        }
+        self.shared.retain(|(semantic, index, _)| named(p, semantic) == Some(*index));
+        let Some(positions) = self.attribute(p, Semantic::Positions, &[Type::Vec3])? else {
+            warnings.add(format!("{place}: has no POSITION and is not shown"));
+            return Ok(None);
+        };
+        if let Some(i) = positions.bad {
+            return Err(format!("position {i} is {:?}; expected numbers", positions.element::<3>(i)));
+        }
+        let count = positions.count;
+        let material = p.material.map_or(self.mappings.len() - 1, |m| m.value());
+        if material >= self.mappings.len() {
+            return Err(format!("material {material} of {}", self.mappings.len() - 1));
+        }
+        let normals = self.attribute(p, Semantic::Normals, &[Type::Vec3])?;
         // A broken normal is not worth the model: the face's own serves.
-        Some(n) if n.count >= count => (0..count).map(|i| DVec3::from_array(n.element::<3>(i)).as_vec3()).collect(),
-        Some(n) => return Err(format!("NORMAL: {} elements for {count} vertices", n.count)),
-        None => Vec::new(),
-    };
-    let uvs = match mappings[material] {
-        Some(mapping) => match attribute(Semantic::TexCoords(mapping.set), &[Type::Vec2])? {
-            Some(uv) => {
-                same(&format!("TEXCOORD_{}", mapping.set), &uv)?;
-                let map = |i| mapping.transform.transform_point2(Vec2::from(uv.element::<2>(i).map(|v| v as f32)));
-                (0..count).map(map).collect()
-            }
-            None => {
-                warnings
-                    .add(format!("{place}: has a texture but no TEXCOORD_{}: it shows the colour of the texture's corner", mapping.set));
-                Vec::new()
-            }
-        },
-        None => Vec::new(),
-    };
-    let colours = match attribute(Semantic::Colors(0), &[Type::Vec3, Type::Vec4])? {
-        Some(c) => {
-            same("COLOR_0", &c)?;
-            if c.width == 4 && (0..count).any(|i| c.element::<4>(i)[3] < 0.999) {
-                warnings.add(format!("{place}: the alpha of its vertex colours is ignored"));
-            }
-            let clamp = |i| DVec3::from_array(c.element::<3>(i)).clamp(DVec3::ZERO, DVec3::ONE).as_vec3();
-            (0..count).map(clamp).collect()
+        if let Some(normals) = normals.as_ref().filter(|normals| normals.count < count) {
+            return Err(format!("NORMAL: {} elements for {count} vertices", normals.count));
         }
-        None => Vec::new(),
-    };
-    let mut influences = Vec::new();
-    for set in 0..4 {
-        let (joints, weights) = (attribute(Semantic::Joints(set), &[Type::Vec4])?, attribute(Semantic::Weights(set), &[Type::Vec4])?);
-        let (Some(joints), Some(weights)) = (joints, weights) else { break };
-        same(&format!("JOINTS_{set}"), &joints)?;
-        same(&format!("WEIGHTS_{set}"), &weights)?;
-        influences.push((joints, weights));
-    }
-    let indices = match p.indices {
-        Some(a) => {
-            let n = data.read_indices(a.value()).map_err(|e| format!("indices: {e}"))?;
-            if let Some(bad) = n.values.iter().find(|v| !(**v >= 0.0 && **v < count as f64)) {
-                return Err(format!("index {bad} of {count} vertices: export the file again"));
-            }
-            n.values.iter().map(|v| *v as u32).collect()
+        let uvs = self.uvs(p, material, count, place, warnings)?;
+        let colours = self.whole(p, Semantic::Colors(0), &[Type::Vec3, Type::Vec4], count)?;
+        let influences = self.influences(p, count)?;
+        let mut corners = self.corners(p, mode, count, place, warnings)?;
+        let used = used(&mut corners, count);
+        if colours.as_ref().is_some_and(|c| c.width == 4 && used.iter().any(|&i| c.element::<4>(i)[3] < 0.999)) {
+            warnings.add(format!("{place}: the alpha of its vertex colours is ignored"));
         }
-        None => (0..count as u32).collect::<Vec<_>>(),
-    };
-    let corners = corners(&indices, mode);
-    if mode == Mode::Triangles && !indices.len().is_multiple_of(3) {
-        warnings.add(format!("{place}: {} indices are not whole triangles: the rest is left out", indices.len()));
+        let of = |all: Option<Shared>| all.into_iter().flat_map(|all| used.iter().map(move |&i| DVec3::from_array(all.element::<3>(i))));
+        Ok(Some(Primitive {
+            positions: of(Some(positions)).collect(),
+            normals: of(normals).map(|normal| normal.as_vec3()).collect(),
+            colours: of(colours).map(|colour| colour.clamp(DVec3::ZERO, DVec3::ONE).as_vec3()).collect(),
+            uvs: match uvs {
+                Some((uvs, map)) => {
+                    let uv = |&i: &usize| map.transform_point2(Vec2::from(uvs.element::<2>(i).map(|v| v as f32)));
+                    used.iter().map(uv).collect()
+                }
+                None => Vec::new(),
+            },
+            influences: influences.iter().map(|(joints, weights)| (joints.picked(&used), weights.picked(&used))).collect(),
+            corners,
+            material,
+        }))
     }
-    let positions = (0..count).map(|i| DVec3::from_array(positions.element::<3>(i))).collect();
-    Ok(Some(Primitive { positions, normals, uvs, colours, influences, corners, material }.trimmed()))
+
+    /// What `p` names as `semantic`, which must be of one of `shapes`; `None` where it names nothing.
+    fn attribute(&mut self, p: &json::mesh::Primitive, semantic: Semantic, shapes: &[Type]) -> Result<Option<Shared>, String> {
+        let Some(index) = named(p, &semantic) else { return Ok(None) };
+        if let Some((.., numbers)) = self.shared.iter().find(|(other, ..)| *other == semantic) {
+            return Ok(Some(numbers.clone()));
+        }
+        let numbers = self.data.read(index, shapes).map_err(|e| format!("{}: {e}", attribute_name(&semantic)))?;
+        let numbers = Rc::new(numbers);
+        self.shared.push((semantic, index, numbers.clone()));
+        Ok(Some(numbers))
+    }
+
+    /// The same, with a number for each of `count` vertices.
+    fn whole(&mut self, p: &json::mesh::Primitive, semantic: Semantic, shapes: &[Type], count: usize) -> Result<Option<Shared>, String> {
+        let what = attribute_name(&semantic);
+        let Some(numbers) = self.attribute(p, semantic, shapes)? else { return Ok(None) };
+        if numbers.count < count {
+            return Err(format!("{what}: {} elements for {count} vertices", numbers.count));
+        }
+        match numbers.bad {
+            Some(i) => Err(format!("{what}: element {i} is not a number")),
+            None => Ok(Some(numbers)),
+        }
+    }
+
+    /// The texture coordinates that `material` wants, if any, and what it does to them.
+    fn uvs(
+        &mut self,
+        p: &json::mesh::Primitive,
+        material: usize,
+        count: usize,
+        place: &str,
+        warnings: &mut Warnings,
+    ) -> Result<Option<(Shared, Affine2)>, String> {
+        let Some(Mapping { set, transform }) = self.mappings[material] else { return Ok(None) };
+        let uvs = self.whole(p, Semantic::TexCoords(set), &[Type::Vec2], count)?;
+        if uvs.is_none() {
+            warnings.add(format!("{place}: has a texture but no TEXCOORD_{set}: it shows the colour of the texture's corner"));
+        }
+        Ok(uvs.map(|uvs| (uvs, transform)))
+    }
+
+    /// Joints and weights, four a vertex in each pair.
+    fn influences(&mut self, p: &json::mesh::Primitive, count: usize) -> Result<Vec<(Shared, Shared)>, String> {
+        let mut influences = Vec::new();
+        for set in 0..4 {
+            if named(p, &Semantic::Joints(set)).is_none() || named(p, &Semantic::Weights(set)).is_none() {
+                break;
+            }
+            let joints = self.whole(p, Semantic::Joints(set), &[Type::Vec4], count)?;
+            let weights = self.whole(p, Semantic::Weights(set), &[Type::Vec4], count)?;
+            influences.extend(joints.zip(weights));
+        }
+        Ok(influences)
+    }
+
+    /// The corners of the triangles, numbers of vertices.
+    fn corners(
+        &self,
+        p: &json::mesh::Primitive,
+        mode: Mode,
+        count: usize,
+        place: &str,
+        warnings: &mut Warnings,
+    ) -> Result<Vec<[u32; 3]>, String> {
+        let indices = match p.indices {
+            Some(a) => {
+                let n = self.data.read_indices(a.value()).map_err(|e| format!("indices: {e}"))?;
+                if let Some(bad) = n.values.iter().find(|v| !(**v >= 0.0 && **v < count as f64)) {
+                    return Err(format!("index {bad} of {count} vertices: export the file again"));
+                }
+                n.values.iter().map(|v| *v as u32).collect()
+            }
+            None => (0..count as u32).collect::<Vec<_>>(),
+        };
+        if mode == Mode::Triangles && !indices.len().is_multiple_of(3) {
+            warnings.add(format!("{place}: {} indices are not whole triangles: the rest is left out", indices.len()));
+        }
+        Ok(corners(&indices, mode))
+    }
+}
+
+/// The accessor that `p` names as `semantic`.
+fn named(p: &json::mesh::Primitive, semantic: &Semantic) -> Option<usize> {
+    p.attributes.get(&Checked::Valid(semantic.clone())).map(|accessor| accessor.value())
 }
 
 fn attribute_name(semantic: &Semantic) -> String {
@@ -289,4 +334,21 @@ fn blend(p: &Primitive, i: usize, joints: &[DMat4]) -> Result<Option<DMat4>, Str
         }
     }
     Ok((total > 0.0).then(|| sum * (1.0 / total)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_shared_vertices_those_are_kept_that_corners_name() {
+        let mut corners = [[90, 7, 50], [7, 90, 8]];
+        assert_eq!(used(&mut corners, 100), [90, 7, 50, 8]);
+        assert_eq!(corners, [[0, 1, 2], [1, 0, 3]], "the same ones in the same order");
+        // Where most are named, all stay where they are.
+        let mut corners = [[2, 1, 0], [1, 2, 4]];
+        assert_eq!(used(&mut corners, 5), [0, 1, 2, 3, 4]);
+        assert_eq!(corners, [[2, 1, 0], [1, 2, 4]]);
+        assert!(used(&mut [], 3).is_empty(), "no triangle, no vertex");
+    }
 }

@@ -192,14 +192,14 @@ fn keys(data: Data<'_>, sampler: &json::animation::Sampler, property: Property) 
     if times.count == 0 {
         return Err("no keys".to_owned());
     }
-    if let Some(i) = times.first_bad().or_else(|| times.values.windows(2).position(|w| w[1] <= w[0]).map(|i| i + 1)) {
+    if let Some(i) = times.bad.or_else(|| times.values.windows(2).position(|w| w[1] <= w[0]).map(|i| i + 1)) {
         return Err(format!("key {i}: time {} does not come after the one before it", times.values[i]));
     }
     let expected = times.count * if interpolation == Interpolation::Cubic { 3 } else { 1 };
     if values.count != expected {
         return Err(format!("{} values for {} keys; expected {expected}", values.count, times.count));
     }
-    if let Some(i) = values.first_bad() {
+    if let Some(i) = values.bad {
         return Err(format!("value {i} is not a number"));
     }
     let values = (0..values.count).map(|i| DVec4::from_array(values.element::<4>(i))).collect();
