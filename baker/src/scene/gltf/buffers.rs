@@ -3,6 +3,9 @@
 
 use crate::files::{read as read_file, rooted};
 use ::gltf::json::Root;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+use base64::{DecodeError, Engine, alphabet};
+use percent_encoding::percent_decode_str;
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -75,8 +78,8 @@ pub(crate) fn locate(uri: &str, folder: &Path) -> Result<Location, String> {
                 p => return Err(format!("data URI: parameter \"{p}\"; expected name=value or base64")),
             }
         }
-        let data = percent_decode(data);
-        return if base64 { decode_base64(&data).map(Location::Data) } else { Ok(Location::Data(data.into_owned())) };
+        let data: Cow<'_, [u8]> = percent_decode_str(data).into();
+        return if base64 { decode_base64(&data) } else { Ok(data.into_owned()) }.map(Location::Data);
     }
     if let Some((scheme, _)) =
         uri.split_once(':').filter(|(s, _)| s.len() > 1 && s.bytes().all(|b| b.is_ascii_alphanumeric() || b"+-.".contains(&b)))
@@ -85,7 +88,7 @@ pub(crate) fn locate(uri: &str, folder: &Path) -> Result<Location, String> {
             "URI \"{uri}\": {scheme}: is never fetched; expected a path beside the file: download it and use a relative path"
         ));
     }
-    let decoded = percent_decode(uri);
+    let decoded: Cow<'_, [u8]> = percent_decode_str(uri).into();
     if rooted(uri.as_bytes()) || rooted(&decoded) {
         return Err(format!("URI \"{uri}\": an absolute path is not read; expected one relative to the file: put what it names beside it"));
     }
@@ -97,56 +100,27 @@ pub(crate) fn locate(uri: &str, folder: &Path) -> Result<Location, String> {
     Ok(Location::File(if !path.exists() && slashed.exists() { slashed } else { path }))
 }
 
-fn percent_decode(text: &str) -> Cow<'_, [u8]> {
-    let bytes = text.as_bytes();
-    if !bytes.contains(&b'%') {
-        return Cow::Borrowed(bytes);
-    }
-    let digit = |i: usize| bytes.get(i).and_then(|b| char::from(*b).to_digit(16));
-    let (mut out, mut i) = (Vec::with_capacity(bytes.len()), 0);
-    while let Some(&b) = bytes.get(i) {
-        match (b, digit(i + 1), digit(i + 2)) {
-            (b'%', Some(high), Some(low)) => {
-                out.push((high * 16 + low) as u8);
-                i += 3;
-            }
-            _ => {
-                out.push(b);
-                i += 1;
-            }
-        }
-    }
-    Cow::Owned(out)
-}
+/// Base64 without padding, whatever the bits are that the last character has too many.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &alphabet::STANDARD,
+    GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::RequireNone).with_decode_allow_trailing_bits(true),
+);
 
+/// Decodes base64 as exporters write it: in lines or not, padded or not, of the alphabet for URLs or the usual one.
 fn decode_base64(text: &[u8]) -> Result<Vec<u8>, String> {
-    let body = match text {
-        [body @ .., b'=', b'='] | [body @ .., b'='] => body,
-        body => body,
+    let shown = text.iter().filter(|c| !matches!(c, b'\r' | b'\n' | b' '));
+    let usual = |c: &u8| match c {
+        b'-' => b'+',
+        b'_' => b'/',
+        other => *other,
     };
-    let mut out = Vec::with_capacity(body.len() / 4 * 3 + 2);
-    let (mut bits, mut count) = (0u32, 0);
-    for (i, &c) in body.iter().enumerate() {
-        let value = match c {
-            b'A'..=b'Z' => c - b'A',
-            b'a'..=b'z' => c - b'a' + 26,
-            b'0'..=b'9' => c - b'0' + 52,
-            b'+' | b'-' => 62,
-            b'/' | b'_' => 63,
-            b'\r' | b'\n' | b' ' => continue,
-            _ => return Err(format!("data URI: character {i} is not base64: the data are damaged")),
-        };
-        bits = (bits << 6 | u32::from(value)) & 0x00ff_ffff;
-        count += 6;
-        if count >= 8 {
-            count -= 8;
-            out.push((bits >> count) as u8);
-        }
-    }
-    if count == 6 {
-        return Err("data URI: the base64 text is cut short: fetch or export it again".to_owned());
-    }
-    Ok(out)
+    let mut plain: Vec<u8> = shown.map(usual).collect();
+    let padding = plain.iter().rev().take(2).take_while(|c| **c == b'=').count();
+    plain.truncate(plain.len() - padding);
+    BASE64.decode(&plain).map_err(|e| match e {
+        DecodeError::InvalidLength(_) => "data URI: the base64 text is cut short: fetch or export it again".to_owned(),
+        other => format!("data URI: no base64 ({other}): the data are damaged: fetch or export the file again"),
+    })
 }
 
 #[cfg(test)]
@@ -160,7 +134,9 @@ mod tests {
         assert_eq!(decode_base64(b"Zm9vYmFy").unwrap(), b"foobar");
         assert!(decode_base64(b"Zm9v!").is_err());
         assert!(decode_base64(b"Zm9vY").is_err());
-        assert_eq!(percent_decode("a%20b%C3%A9%").as_ref(), "a bé%".as_bytes());
+        assert_eq!(decode_base64(b"Zm9v\r\nYg").unwrap(), b"foob");
+        assert_eq!(decode_base64(b"-_-_").unwrap(), [0xfb, 0xff, 0xbf]);
+        assert_eq!(fetch("data:,a%20b%C3%A9%", Path::new("")).unwrap(), "a bé%".as_bytes());
     }
 
     #[test]
