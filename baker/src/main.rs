@@ -44,6 +44,10 @@ fn bake(name: &str, output: &Path, args: &Bake) -> Result<()> {
     if let Some(clash) = args.clash() {
         Cli::command().error(ErrorKind::ArgumentConflict, clash).exit();
     }
+    let start = Instant::now();
+    let scene = load(name, &args.playback)?;
+    let options = args.options(start.elapsed().as_secs_f64());
+    // A scene that is no good leaves no folders behind; what cannot be written is told before minutes of work.
     files::check(output)?;
     if let Some(path) = &args.report {
         files::check(path)?;
@@ -51,9 +55,6 @@ fn bake(name: &str, output: &Path, args: &Bake) -> Result<()> {
     if let Some(folder) = &args.diagnostics {
         files::check_folder(folder)?;
     }
-    let start = Instant::now();
-    let scene = load(name, &args.playback)?;
-    let options = args.options(start.elapsed().as_secs_f64());
     let bar = bar(args.quiet);
     let baked = job::run(&scene, &options, &|stage, part| {
         bar.set_message(stage.to_owned());

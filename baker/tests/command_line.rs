@@ -57,6 +57,12 @@ fn what_cannot_be_written_is_said_before_the_work() {
     refused(&bake(dir.path(), "a.obj", &["-o", "new/"]), 1, "expected a file's name");
     refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--diagnostics", "plain"]), 1, "plain: the folder cannot be made");
     refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--report", "plain/a.json"]), 1, "plain: the folder cannot be made");
+    // Nor is a folder made for a scene that is no good.
+    refused(
+        &bake(dir.path(), "none.obj", &["-o", "new/a.cubist", "--report", "new/a.json", "--diagnostics", "pictures"]),
+        1,
+        "no such file",
+    );
     assert_eq!(names(dir.path()), ["a.obj", "plain"]);
 }
 
