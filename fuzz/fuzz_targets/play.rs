@@ -3,32 +3,12 @@
 #![no_main]
 
 use arbitrary::{Arbitrary, Unstructured};
-use cubist_baker::atlas::Storage;
-use cubist_baker::bake::Settings;
-use cubist_core::format::TexelKind;
-use cubist_tests::mutate::{Edit, mutated};
-use cubist_tests::scenes;
+use cubist_tests::mutate::{Edit, mutated, seeds};
 use cubist_tests::survive::{Dose, survives};
 use libfuzzer_sys::fuzz_target;
 use std::sync::LazyLock;
 
-/// As small as bundles with everything in them can be.
-static SEEDS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| {
-    let kinds = [
-        ("street", TexelKind::Indexed8, Storage::Raw),
-        ("columns", TexelKind::Indexed4, Storage::Packed),
-        ("mirrors", TexelKind::Indexed8, Storage::Packed),
-        ("pyramid", TexelKind::Direct565, Storage::Raw),
-    ];
-    let seed = |(name, texels, storage)| {
-        let mut settings = Settings { cell: 8, key_interval: 2, ..Settings::default() };
-        (settings.atlas.max_side, settings.atlas.texels, settings.atlas.storage) = (64, texels, storage);
-        let mut scene = scenes::reduced(name, [20, 12], 5).expect("there is such a scene");
-        scene.playback.looping = name == "columns";
-        scenes::bake(&scene, &settings).expect("it bakes").1.bundle
-    };
-    kinds.into_iter().map(seed).collect()
-});
+static SEEDS: LazyLock<Vec<Vec<u8>>> = LazyLock::new(|| seeds().expect("they bake"));
 
 /// A seed and what is done to it.
 #[derive(Debug)]

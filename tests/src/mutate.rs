@@ -3,8 +3,14 @@
 //! Edits come by lot from the tests, or from a fuzzer's bytes; bundles go through `survive`.
 
 use crate::random::{EDGES, Random};
+use crate::scenes;
 use crate::tamper::seal;
-use cubist_core::format::{ATLAS, Atlas, Envelope, KEY_BYTES, KeyEntry, LABEL_BYTES, LABELS, LabelRecord, Limits, PATH, Path, Section};
+use anyhow::Result;
+use cubist_baker::atlas::Storage;
+use cubist_baker::bake::Settings;
+use cubist_core::format::{
+    ATLAS, Atlas, Envelope, KEY_BYTES, KeyEntry, LABEL_BYTES, LABELS, LabelRecord, Limits, PATH, Path, Section, TexelKind,
+};
 
 /// One change. Places and choices may be any numbers: they are brought into range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,6 +107,28 @@ impl Edit {
             _ => Self::Records(random.below(500) as u16, byte(random)),
         }
     }
+}
+
+/// Bundles to change: as small as they can be with everything in them. One is raw with a palette, one packed with a palette, one packed with few colours
+/// on a loop, one raw without a palette.
+///
+/// # Errors
+/// A scene that does not bake.
+pub fn seeds() -> Result<Vec<Vec<u8>>> {
+    let kinds = [
+        ("street", TexelKind::Indexed8, Storage::Raw),
+        ("columns", TexelKind::Indexed4, Storage::Packed),
+        ("mirrors", TexelKind::Indexed8, Storage::Packed),
+        ("pyramid", TexelKind::Direct565, Storage::Raw),
+    ];
+    let seed = |(name, texels, storage)| {
+        let mut settings = Settings { cell: 8, key_interval: 2, ..Settings::default() };
+        (settings.atlas.max_side, settings.atlas.texels, settings.atlas.storage) = (64, texels, storage);
+        let mut scene = scenes::reduced(name, [20, 12], 5)?;
+        scene.playback.looping = name == "columns";
+        Ok(scenes::bake(&scene, &settings)?.1.bundle)
+    };
+    kinds.into_iter().map(seed).collect()
 }
 
 /// A section in memory of its own.

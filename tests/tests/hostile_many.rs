@@ -1,12 +1,8 @@
 //! A hundred thousand hostile bundles, each changed where its format has a number: refused, or played within the work that its header says.
 //! Bundles come from `cubist_tests::mutate`; what must hold stands in `cubist_tests::survive`. The fuzzer goes the same ways for longer.
 
-use cubist_baker::atlas::Storage;
-use cubist_baker::bake::Settings;
-use cubist_core::format::TexelKind;
-use cubist_tests::mutate::{Edit, mutated};
+use cubist_tests::mutate::{Edit, mutated, seeds};
 use cubist_tests::random::Random;
-use cubist_tests::scenes;
 use cubist_tests::survive::{Dose, survives};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -14,28 +10,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// Bundles in all.
 const BUNDLES: u64 = 100_000;
 
-/// As small as bundles with everything in them can be.
-fn seeds() -> Vec<Vec<u8>> {
-    let kinds = [
-        ("street", TexelKind::Indexed8, Storage::Raw),
-        ("columns", TexelKind::Indexed4, Storage::Packed),
-        ("mirrors", TexelKind::Indexed8, Storage::Packed),
-        ("pyramid", TexelKind::Direct565, Storage::Raw),
-    ];
-    let seed = |(name, texels, storage)| {
-        let mut settings = Settings { cell: 8, key_interval: 2, ..Settings::default() };
-        (settings.atlas.max_side, settings.atlas.texels, settings.atlas.storage) = (64, texels, storage);
-        let mut scene = scenes::reduced(name, [20, 12], 5).expect("there is such a scene");
-        scene.playback.looping = name == "columns";
-        scenes::bake(&scene, &settings).expect("it bakes").1.bundle
-    };
-    kinds.into_iter().map(seed).collect()
-}
-
 #[test]
 fn a_hundred_thousand_hostile_bundles_are_refused_or_play() {
     let dose = Dose { rows: 2, pixels: 32, walk: 2, middle: false };
-    let seeds = seeds();
+    let seeds = seeds().expect("they bake");
     assert!(seeds.iter().all(|seed| survives(seed, dose)), "the seeds play");
     let played: usize = (0..BUNDLES)
         .into_par_iter()
@@ -72,7 +50,7 @@ impl Drop for Told<'_> {
 
 #[test]
 fn every_cut_of_every_seed_is_refused_sealed_or_not() {
-    for seed in seeds() {
+    for seed in seeds().expect("they bake") {
         for length in 0..seed.len() {
             let mut cut = seed[..length].to_vec();
             assert!(cubist_core::Bundle::parse(&cut).is_err(), "{length} bytes parse");
