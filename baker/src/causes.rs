@@ -13,7 +13,8 @@ const FOOTPRINTS: f64 = 3.0;
 /// ... and over a wider one that leaves the plane of either face by less than this share.
 const LEVEL: f64 = 0.05;
 
-/// Shares of all cells and intervals, %, that are torn, each by the cause that most of its neighbouring pixels tell.
+/// Shares of all cells and intervals, %, that are torn, each by the cause that most of its neighbouring pixels tell; one whose pixels tell none is in no
+/// share.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Causes {
     /// Charts of one surface meet.
@@ -96,7 +97,7 @@ pub fn count(gbuffer: &GBuffer, tears: &[u8], seams: &[u8], grid: &KeyGrid, shee
             });
         }
         // Of equals the first.
-        (0..4).max_by_key(|&cause| (votes[cause], std::cmp::Reverse(cause)))
+        (0..4).filter(|&cause| votes[cause] > 0).max_by_key(|&cause| (votes[cause], std::cmp::Reverse(cause)))
     };
     let torn = (0..sheets.lists.len()).into_par_iter().filter(|&index| sheets.lists[index].len() > 1).filter_map(of);
     let counts = torn
