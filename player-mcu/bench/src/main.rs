@@ -10,6 +10,7 @@
 //! `cubist-mcu card WIDTHxHEIGHT OUT` writes the test card's scene, for the baker, into the folder OUT.
 
 mod card;
+mod emulated;
 mod figures;
 mod font;
 mod host;

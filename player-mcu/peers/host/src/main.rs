@@ -5,6 +5,8 @@
 //! `peers/run` calls both.
 
 mod decode;
+#[path = "../../../bench/src/emulated.rs"]
+mod emulated;
 mod figures;
 mod make;
 mod qemu;
