@@ -1,0 +1,140 @@
+//! What the user should know of a bundle: what it does not show, and what to do about that. Figures come from the report's own origin.
+
+use super::Origin;
+use crate::finer::uneven;
+use crate::verify::Quality;
+
+/// Below this share of the resolution asked for, the source image is called too small.
+const COARSE: f64 = 0.7;
+/// From this share of pixels on, %, left-out surfaces are worth a warning.
+const DROPPED_PERCENT: f64 = 0.01;
+/// Of the pixels that show the scene, percent, from which on the warning says that most likely something else was meant.
+const LOST_PERCENT: f64 = 25.0;
+
+/// What keeps surfaces too small for cells of `cell` pixels and keys every `interval` frames.
+fn finer(cell: u32, interval: u32) -> &'static str {
+    match (cell, interval) {
+        (5.., 2..) => "a shorter --key-interval or smaller cells (--cell) keep them",
+        (5.., _) => "smaller cells (--cell) keep them",
+        // There are no smaller cells than of 4 pixels.
+        (_, 2..) => "a shorter --key-interval keeps them",
+        _ => "a larger --size keeps them",
+    }
+}
+
+/// Tells a frame in which whole things are missing.
+fn missing(quality: &Quality, interval: u32) -> Option<String> {
+    let off = uneven(quality.wrong_surface_percent, [quality.psnr_mean, quality.psnr_min])?;
+    let cure = if interval > 1 { "--key-interval 1 keeps most of them" } else { "a slower path, or more --frames, keeps them" };
+    Some(format!(
+        "frame {} is {off:.1} dB worse than the mean: things that sweep past the camera are missing there; {cure}",
+        quality.worst_frame
+    ))
+}
+
+/// What the scene's loader warned of, and the pipeline itself.
+pub(super) fn of(origin: &Origin<'_>, quality: &Quality, interval: u32) -> Vec<String> {
+    let own = [surfaces(origin), source_image(origin), shared_labels(origin), crossed(origin), still(origin)].into_iter().flatten();
+    origin.scene.warnings.iter().cloned().chain(own).chain(missing(quality, interval)).collect()
+}
+
+/// Surfaces that are not shown, because they are too small on the screen.
+fn surfaces(origin: &Origin<'_>) -> Option<String> {
+    let Origin { flat, encoded, settings, .. } = origin;
+    let (cell, interval) = (settings.cell, settings.key_interval);
+    let share = |of: u64| 100.0 * encoded.dropped_pixels as f64 / of.max(1) as f64;
+    let dropped = share(flat.rays);
+    // Of those that show more than the backdrop.
+    let lost = share(flat.atlas.gbuffer.label.iter().filter(|&&label| label != 0).count() as u64);
+    if lost > LOST_PERCENT {
+        return Some(format!(
+            "{lost:.0} % of what the camera sees of the scene is lost: its surfaces are too small on the screen for cells of {cell} x {cell} pixels; bring \
+             the camera nearer, raise --size, or try --cell 4 --key-interval 1 --sheets all"
+        ));
+    }
+    let cure = finer(cell, interval);
+    let (or, cure) = match settings.error > 0.0 {
+        true => (", or is not worth its bytes there", format!("--sheets all keeps more such surfaces; {cure}")),
+        false => ("", cure.to_owned()),
+    };
+    (dropped > DROPPED_PERCENT).then(|| {
+        format!(
+            "{dropped:.2} % of the pixels show not their own surface but a neighbour of it; theirs covers too little of its cell of {cell} x {cell} pixels x \
+             {interval} frames{or}; {cure}"
+        )
+    })
+}
+
+/// A source image that is coarser than was asked for.
+fn source_image(origin: &Origin<'_>) -> Option<String> {
+    let (settings, scale) = (&origin.settings.atlas, origin.flat.atlas.figures.scale);
+    let cure = match settings.max_side {
+        side @ ..1024 => format!("raise --atlas above {side}"),
+        _ => "shorten the path or lower --size".to_owned(),
+    };
+    (scale < COARSE).then(|| {
+        format!(
+            "the source image holds {:.0} % of the resolution asked for, {:.2} texels a pixel at the closest view; {cure}",
+            100.0 * scale,
+            scale * settings.density
+        )
+    })
+}
+
+/// Charts that have a label in common.
+fn shared_labels(origin: &Origin<'_>) -> Option<String> {
+    let figures = &origin.flat.atlas.figures;
+    let but = match figures.crowded {
+        0 => String::new(),
+        crowded => format!(", but for {crowded} that little is seen of, for want of labels; lower --size or simplify the scene"),
+    };
+    (figures.charts + 1 > figures.labels).then(|| {
+        format!(
+            "{} charts share {} labels: charts that are never seen near each other have one in common{but}",
+            figures.charts,
+            figures.labels - 1
+        )
+    })
+}
+
+/// A path that goes through things.
+fn crossed(origin: &Origin<'_>) -> Option<String> {
+    let (first, rest) = origin.flat.crossed.split_first()?;
+    let more = if rest.is_empty() { String::new() } else { format!(", and {} more times", rest.len()) };
+    Some(format!(
+        "the camera goes through a surface between frames {first} and {}{more}: what is behind it shows all at once; move the path around it",
+        first + 1
+    ))
+}
+
+/// A loop that goes nowhere.
+fn still(origin: &Origin<'_>) -> Option<String> {
+    let play = &origin.scene.playback;
+    (play.looping && play.frames == 1).then(|| "a looping path of one frame shows a single picture".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn advice_can_be_followed() {
+        assert!(finer(8, 8).contains("--cell"));
+        assert!(finer(4, 8).contains("--key-interval"));
+        assert!(finer(4, 1).contains("--size"));
+    }
+
+    #[test]
+    fn what_is_missing_in_a_frame_is_told() {
+        let quality = |psnr_min, wrong_surface_percent| Quality {
+            psnr_mean: 30.0,
+            psnr_min,
+            worst_frame: 7,
+            wrong_surface_percent,
+            ..Quality::default()
+        };
+        assert!(missing(&quality(25.0, 3.0), 8).unwrap().starts_with("frame 7 is 5.0 dB worse"));
+        assert!(missing(&quality(25.0, 3.0), 1).unwrap().contains("--frames"));
+        assert!(missing(&quality(25.0, 1.0), 8).is_none() && missing(&quality(27.0, 3.0), 8).is_none());
+    }
+}
