@@ -108,14 +108,18 @@ pub struct Bake {
     /// Texels a pixel where a surface is seen closest, at most, 0.05 to 8; 0.7 halves the source image.
     #[arg(long, value_name = "RATIO", default_value_t = atlas::Settings::default().density, value_parser = density)]
     pub density: f64,
-    /// What detail is worth, 0.001 to 100 bytes, or all: more keeps more texels, in a larger source image [default: 0.03].
+    /// How many bytes detail is worth: 0.001 to 100, or all. More keeps more texels and makes the source image larger [default: 0.03].
     ///
-    /// A chart gets fewer texels than --density asks where they take more bytes than what they show is worth: this much for each pixel of each frame
-    /// whose colour is eight levels of 255 off since its texel is longer than the pixel, four times as much for sixteen levels; an eighth of it whose texel
-    /// is twice as long, whatever its colour; a path counts 128 frames more than it has. So plain walls get few texels, and print on them many. All keeps
-    /// --density in every chart: bundles of models take a third to a half as many bytes again, those of a street or a room three times as many, for .2 to
-    /// 1.3 dB. With 0.1 a model took a third more, for .9 dB (with softened outlines 1.3), a street too, for .3, and a room four fifths, for .1. A scene that
-    /// brings a flattening of its own, as built-in ones do, keeps its texels. With --budget the search may keep all, unless this is given.
+    /// Plain walls get few texels, and print on them many. For each chart, the bytes of its texels are weighed against what they would show. WORTH is what
+    /// one pixel of one frame counts whose colour is eight levels of 255 off because its texel is longer than the pixel. One that is sixteen levels off
+    /// counts four times as much. One whose texel is twice as long as the pixel counts an eighth of WORTH, whatever its colour. A path counts 128 frames
+    /// more than it has.
+    ///
+    /// All gives every chart the texels that --density asks for. Bundles of models then take a third to a half more bytes, those of a street or a room
+    /// three times as many, for .2 to 1.3 dB. With 0.1 a model took a third more for .9 dB (1.3 with softened outlines), a street a third more for .3 dB,
+    /// and a room four fifths more for .1 dB.
+    ///
+    /// A scene that brings a flattening of its own, as built-in ones do, keeps its texels. With --budget the search may keep all, unless this is given.
     #[arg(long, value_name = "WORTH")]
     pub detail: Option<Detail>,
     /// What a texel of the source image is, and so what it costs.
@@ -147,10 +151,11 @@ pub struct Bake {
     /// Land that reaches from the camera to the horizon is then finer near than far. Auto tries it where --charts tries, after the best of those.
     #[arg(long, value_enum, value_name = "KIND", default_value_t = Rewarp::Auto)]
     pub rewarp: Rewarp,
-    /// What a bit of the keys is worth, auto or 0 to 100: more takes fewer bytes at less quality.
+    /// What a bit of the keys is worth: auto, or 0 to 100. A larger number takes fewer bytes, at less quality.
     ///
-    /// Auto takes 0.01, 0.05, 0.2 or 1, the coarsest that pays: halving the keys' bytes may cost 1.55 dB. Rough land is as good at 1; a flat
-    /// picture of fine stripes needs 0.01. Then it takes steps twice to eight times as coarse as positions are stored in, likewise. Searches (--budget, --psnr) choose on their own.
+    /// Auto tries 0.01, 0.05, 0.2 and 1, and takes the largest that pays: half the keys' bytes may cost 1.55 dB. Rough land is as good at 1. A flat picture
+    /// of fine stripes needs 0.01. By the same rule auto then tries to store positions in steps twice to eight times as coarse. The searches for --budget
+    /// and --psnr choose the number themselves.
     #[arg(long, value_name = "WORTH", value_parser = lambda, default_value = "auto")]
     pub lambda: Worth,
     /// Which of the surfaces that a cell sees it keeps.
