@@ -205,7 +205,7 @@ fn the_core_imports_downwards() {
             found.push(format!("{}: has no place in ORDER of tests/tests/architecture.rs", source.path));
             continue;
         };
-        for import in source::imports(&source.code_without_tests()) {
+        for import in source::imports(&source.code_without_tests(), "crate::") {
             let target = reexports.get(&import).unwrap_or(&import);
             match place(target) {
                 None => found.push(format!("{}: crate::{import} is no module of ORDER", source.path)),
@@ -218,18 +218,8 @@ fn the_core_imports_downwards() {
     assert_eq!(reexports.get("Bundle").map(String::as_str), Some("bundle"), "the re-exports are read as they should be");
 }
 
-/// Modules are files beside `lib.rs`, and folders.
-#[test]
-fn the_baker_imports_in_no_circle() {
-    let mut imports: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-    for source in source::below("baker/src/") {
-        let name = source.path["baker/src/".len()..].trim_end_matches(".rs").split('/').next().unwrap_or("").to_owned();
-        if !matches!(name.as_str(), "lib" | "main") {
-            let named = imports.entry(name.clone()).or_default();
-            named.extend(source::imports(&source.code_without_tests()).into_iter().filter(|other| *other != name));
-        }
-    }
-    assert!(imports["job"].contains("bake") && imports["bake"].contains("gbuffer"), "the imports are read as they should be");
+/// Of modules, each with those that it imports, those that import what imports them, by whatever way.
+fn circles(mut imports: BTreeMap<String, BTreeSet<String>>) -> Vec<String> {
     // What imports nothing that is left is in no circle.
     let leaf = |left: &BTreeMap<String, BTreeSet<String>>| {
         left.iter().find(|(_, named)| named.iter().all(|name| !left.contains_key(name))).map(|(name, _)| name.clone())
@@ -239,7 +229,38 @@ fn the_baker_imports_in_no_circle() {
     }
     // What imports one is left, too: only what is imported by another of them.
     let circle = imports.keys().filter(|name| imports.values().any(|named| named.contains(*name)));
-    none(circle.map(|name| format!("baker/src/{name}: imports what imports it: {:?}", imports[name])).collect());
+    circle.map(|name| format!("{name}: imports what imports it: {:?}", imports[name])).collect()
+}
+
+/// Modules are files beside `lib.rs`, and folders.
+#[test]
+fn the_baker_imports_in_no_circle() {
+    let mut imports: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for source in source::below("baker/src/") {
+        let name = source.path["baker/src/".len()..].trim_end_matches(".rs").split('/').next().unwrap_or("").to_owned();
+        if !matches!(name.as_str(), "lib" | "main") {
+            let named = imports.entry(name.clone()).or_default();
+            named.extend(source::imports(&source.code_without_tests(), "crate::").into_iter().filter(|other| *other != name));
+        }
+    }
+    assert!(imports["job"].contains("bake") && imports["bake"].contains("gbuffer"), "the imports are read as they should be");
+    none(circles(imports));
+}
+
+/// Files name each other from `super`; what `mod.rs` holds itself is for the outside.
+#[test]
+fn the_files_of_charts_import_in_no_circle() {
+    let folder = "baker/src/chart/";
+    let mut imports: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    for source in source::below(folder) {
+        let named = source::imports(&source.code_without_tests(), "super::").into_iter().collect();
+        imports.insert(source.path[folder.len()..].trim_end_matches(".rs").to_owned(), named);
+    }
+    assert!(imports["merge"].contains("clusters") && imports["clusters"].contains("view"), "the imports are read as they should be");
+    let unknown =
+        imports.iter().flat_map(|(name, named)| named.iter().filter(|other| !imports.contains_key(*other)).map(move |other| (name, other)));
+    none(unknown.map(|(name, other)| format!("{folder}{name}.rs: {other} is none of the folder's files")).collect());
+    none(circles(imports));
 }
 
 #[test]

@@ -1,9 +1,8 @@
 //! Absorption: small clusters join a neighbour whose plane still shows them.
 //! Clusters come from `merge`; fewer of them go on to be measured.
 
-use super::NONE;
-use super::merge::Clusters;
-use super::observe::{Faces, Links};
+use super::clusters::Clusters;
+use super::observe::{Faces, Links, NONE};
 use crate::joins::root;
 use std::collections::BTreeMap;
 

@@ -2,8 +2,8 @@
 //! a cell shows two rods of a lattice, the outline of one label cannot be that of both.
 //! Charts come flattened and without folds; more of them go on to be measured.
 
-use super::observe::Links;
-use super::{Charting, NONE};
+use super::charting::Charting;
+use super::observe::{Links, NONE};
 use crate::gbuffer::{BACKGROUND, Hits, Lens, Sample};
 use crate::scene::Scene;
 use glam::DVec3;

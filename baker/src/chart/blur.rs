@@ -1,7 +1,7 @@
 //! Blur: how much of what charts show is lost in longer texels, told from colours that the scene has in the pixels of some frames.
 //! Samples come from the G-buffer and colours from [`Shader`]; `measure` weighs what is lost against bytes.
 
-use super::{COARSER, Charting};
+use super::charting::{COARSER, Charting};
 use crate::gbuffer::{BACKGROUND, Hits, Lens, Sample};
 use crate::scene::Scene;
 use crate::shade::Shader;

@@ -1,7 +1,7 @@
 //! Families of views: what a chart's projection is chosen for, and why one of them was chosen.
 //! Settings name one; `merge` and `refine` ask it for views and for what they cost, the report and the bundle for the reason.
 
-use super::merge::Weights;
+use super::clusters::Weights;
 use super::observe::Face;
 use super::view::View;
 use super::{directions, sight};

@@ -1,8 +1,8 @@
 //! Folds: parts of a chart that would cover each other are taken out into charts of their own.
 //! Measured charts come in; charts whose texels each show one depth go on to the packing.
 
+use super::charting::{Charting, Projection};
 use super::observe::Links;
-use super::{Charting, Projection};
 use crate::gbuffer::{BACKGROUND, Hits};
 use rayon::prelude::*;
 use std::collections::VecDeque;

@@ -1,7 +1,9 @@
 //! The scene's own flattening, kept: one chart an island, one texel a texel of the texture.
 //! Built-in scenes bring it; charts go to the atlas like any other.
 
-use super::{Chart, Charting, Faces, NONE, Projection, measure};
+use super::charting::{Chart, Charting, Projection};
+use super::measure;
+use super::observe::{Faces, NONE};
 use crate::gbuffer::Hits;
 use crate::scene::Scene;
 

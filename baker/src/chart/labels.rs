@@ -1,7 +1,7 @@
 //! Labels for charts: one each while there are few, shared by charts that do not meet on the screen when there are many.
 //! Charts come from the charting; labels go into the G-buffer.
 
-use super::Charting;
+use super::charting::Charting;
 use crate::gbuffer::{BACKGROUND, Hits};
 use rayon::prelude::*;
 use std::collections::BTreeSet;

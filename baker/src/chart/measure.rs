@@ -2,7 +2,7 @@
 //! Samples come from the G-buffer; the figures go to `fold` and to the packing.
 
 use super::blur::{Loss, Seen};
-use super::{COARSER, Chart, Charting, Density, Projection};
+use super::charting::{COARSER, Chart, Charting, Density, Projection};
 use crate::gbuffer::{BACKGROUND, Hits, Lens};
 use crate::scene::Scene;
 use glam::DVec3;

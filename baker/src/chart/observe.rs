@@ -1,12 +1,14 @@
 //! What is seen: faces, how often, from which side, and which lie next to each other on the screen.
 //! Samples come from the G-buffer; faces and links go to the growing of charts.
 
-use super::NONE;
 use crate::gbuffer::{BACKGROUND, Hits, Lens, Sample};
 use crate::scene::Scene;
 use glam::DVec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicI64, AtomicU32, Ordering};
+
+/// Not a face, not a chart.
+pub(crate) const NONE: u32 = u32::MAX;
 
 /// A surface that at least one pixel sees.
 #[derive(Clone)]

@@ -1,7 +1,8 @@
 //! Prices: what the charts of a scene are likely to cost, told without coding them.
 //! Charts come measured; the price decides between candidates.
 
-use super::{Charting, FLAT, NONE};
+use super::charting::{Charting, FLAT};
+use super::observe::NONE;
 use crate::gbuffer::{BACKGROUND, Hits};
 use rayon::prelude::*;
 

@@ -1,11 +1,10 @@
 //! Refinement: the groups that merging starts from, and the faces that change sides after it.
 //! Faces and links come from `observe`; `merge` calls both.
 
-use super::NONE;
+use super::clusters::{Border, Clusters, Weights};
 use super::family::Family;
 use super::flat::Flat;
-use super::merge::{Border, Clusters, Weights};
-use super::observe::{Faces, Links};
+use super::observe::{Faces, Links, NONE};
 use super::view::View;
 use glam::DVec3;
 use std::cmp::Reverse;

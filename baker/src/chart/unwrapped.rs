@@ -1,7 +1,8 @@
 //! A model's texture coordinates as a flattening: islands are faces joined along edges that they share in space and in the texture.
 //! Triangles come from the scene; charts go through `measure` and `fold` like those of other families.
 
-use super::{Chart, Charting, Faces, NONE, Projection};
+use super::charting::{Chart, Charting, Projection};
+use super::observe::{Faces, NONE};
 use crate::joins::root;
 use crate::scene::{Scene, Triangle};
 use glam::DVec2;

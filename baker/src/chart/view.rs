@@ -1,8 +1,9 @@
 //! Views: the virtual cameras that charts may be projected by, along parallel rays or from a point.
 //! `directions` makes them, `merge` and `refine` choose among them; a chart is flattened as its view sees it.
 
+use super::charting::Projection;
+use super::measure;
 use super::observe::Face;
-use super::{Projection, measure};
 use glam::DVec3;
 
 /// The least cosine between a point's ray and the middle of what a view from a point shows: 63 degrees.

@@ -94,10 +94,10 @@ pub fn line(code: &str, at: usize) -> usize {
     code[..at].matches('\n').count() + 1
 }
 
-/// What follows `crate::` in `code`: the first name, or each first name of a group in braces.
+/// What follows `from`, `crate::` or `super::`, in `code`: the first name, or each first name of a group in braces.
 #[must_use]
-pub fn imports(code: &str) -> Vec<String> {
-    code.split("crate::").skip(1).flat_map(first_names).collect()
+pub fn imports(code: &str, from: &str) -> Vec<String> {
+    code.split(from).skip(1).flat_map(first_names).collect()
 }
 
 /// The pairs (name, module) of every `pub use module::name` and `pub use module::{names}` in `code`.
@@ -221,7 +221,7 @@ mod tests {
     #[test]
     fn names_are_found_in_paths_and_groups() {
         assert_eq!(
-            imports("use crate::grid::Grid; crate::x(); use crate::{Bundle, key::{self, Key}, lists};"),
+            imports("use crate::grid::Grid; crate::x(); use crate::{Bundle, key::{self, Key}, lists};", "crate::"),
             ["grid", "x", "Bundle", "key", "lists"]
         );
         let expected = [("A", "a"), ("B", "b"), ("c", "b")].map(|(name, module)| (name.to_owned(), module.to_owned()));
