@@ -132,6 +132,15 @@ impl Image {
     }
 }
 
+/// The source images that a search for a budget has to choose from.
+struct Images {
+    all: Vec<Image>,
+    /// The finest that leaves room for keys, or else the coarsest: keys are measured at this one.
+    reference: Flat,
+    /// Bytes of the one that is as fine as asked for; packed, if that is left to the search.
+    usual: (usize, Option<usize>),
+}
+
 /// A way to code keys, measured at one source image.
 #[derive(Clone, Copy)]
 struct Keys {
@@ -186,12 +195,34 @@ impl Search<'_> {
     fn budget(&self, budget: u64) -> Result<Chosen, BakeError> {
         let steps = IMAGES + self.grids(self.options.source()).len() + TRIES + STEPS;
         let samples = Samples::new(self.cast);
+        let Images { all: images, reference, usual } = self.images(budget, &samples, steps)?;
+        let keys = self.keys(&reference, &samples, steps)?;
+        drop(reference);
+        let mut pairs: Vec<(&Image, &Keys)> = images.iter().flat_map(|image| keys.iter().map(move |keys| (image, keys))).collect();
+        pairs.sort_by(|a, b| {
+            let error = |(image, keys): &(&Image, &Keys)| image.error + keys.error;
+            error(a).total_cmp(&error(b)).then(a.0.with(a.1, budget).0.cmp(&b.0.with(b.1, budget).0))
+        });
+        let chosen = self.best_pair(budget, &pairs, &samples, steps)?;
+        // Half of what its keys take here may go as they are settled.
+        let base = self.options.settings(self.scene.playback.width);
+        let own = keys.iter().find(|keys| (keys.settings.cell, keys.settings.key_interval) == (base.cell, base.key_interval));
+        let fits = |image: usize| (image + own.map_or(0, |own| own.bytes / 2)) as u64 <= budget;
+        let contested = match usual {
+            (bytes, _) if fits(bytes) => Some(base.atlas.storage),
+            (_, Some(packed)) if fits(packed) => Some(Storage::Packed),
+            _ => None,
+        };
+        Ok(Chosen { contested, ..chosen })
+    }
+
+    /// Measures source images, the finest first, but for those that are far too large for `budget`.
+    fn images(&self, budget: u64, samples: &Samples, steps: usize) -> Result<Images, BakeError> {
         let room = usize::try_from(budget).unwrap_or(usize::MAX);
-        let mut images: Vec<Image> = Vec::new();
-        let mut reference: Option<Flat> = None;
         let asked = self.options.source();
+        let (mut images, mut reference, mut usual): (Vec<Image>, _, _) = (Vec::new(), None, None);
         let all = self.options.detail.is_none().then_some((f64::INFINITY, 1.0));
-        let (mut scale, mut usual) = (1.0, None);
+        let mut scale = 1.0;
         for (step, (detail, ratio)) in all.into_iter().chain(DENSITIES.map(|ratio| (asked.detail, ratio))).enumerate() {
             self.say(step, steps);
             let source = atlas::Settings { density: asked.density * scale * ratio, detail, ..asked };
@@ -221,25 +252,10 @@ impl Search<'_> {
                 images.push(image);
             }
         }
-        let Some(flat) = reference else { return Err(BakeError::Budget { budget, smallest: u64::MAX }) };
-        let keys = self.keys(&flat, &samples, steps)?;
-        drop(flat);
-        let mut pairs: Vec<(&Image, &Keys)> = images.iter().flat_map(|image| keys.iter().map(move |keys| (image, keys))).collect();
-        pairs.sort_by(|a, b| {
-            let error = |(image, keys): &(&Image, &Keys)| image.error + keys.error;
-            error(a).total_cmp(&error(b)).then(a.0.with(a.1, budget).0.cmp(&b.0.with(b.1, budget).0))
-        });
-        let chosen = self.best_pair(budget, &pairs, &samples, steps)?;
-        // Half of what its keys take here may go as they are settled.
-        let base = self.options.settings(self.scene.playback.width);
-        let own = keys.iter().find(|keys| (keys.settings.cell, keys.settings.key_interval) == (base.cell, base.key_interval));
-        let fits = |image: usize| (image + own.map_or(0, |own| own.bytes / 2)) as u64 <= budget;
-        let contested = match usual {
-            Some((bytes, _)) if fits(bytes) => Some(asked.storage),
-            Some((_, Some(packed))) if fits(packed) => Some(Storage::Packed),
-            _ => None,
-        };
-        Ok(Chosen { contested, ..chosen })
+        match (reference, usual) {
+            (Some(reference), Some(usual)) => Ok(Images { all: images, reference, usual }),
+            _ => Err(BakeError::Budget { budget, smallest: u64::MAX }),
+        }
     }
 
     /// Measures every way to code keys at one source image.
