@@ -8,29 +8,8 @@ use crate::verify::Quality;
 const COARSE: f64 = 0.7;
 /// From this share of pixels on, %, left-out surfaces are worth a warning.
 const DROPPED_PERCENT: f64 = 0.01;
-/// Of the pixels that show the scene, percent, from which on the warning says that most likely something else was meant.
+/// Where a larger share of the pixels that show the scene is lost, %, smaller cells alone are no cure.
 const LOST_PERCENT: f64 = 25.0;
-
-/// What keeps surfaces too small for cells of `cell` pixels and keys every `interval` frames.
-fn finer(cell: u32, interval: u32) -> &'static str {
-    match (cell, interval) {
-        (5.., 2..) => "a shorter --key-interval or smaller cells (--cell) keep them",
-        (5.., _) => "smaller cells (--cell) keep them",
-        // There are no smaller cells than of 4 pixels.
-        (_, 2..) => "a shorter --key-interval keeps them",
-        _ => "a larger --size keeps them",
-    }
-}
-
-/// Tells a frame in which whole things are missing.
-fn missing(quality: &Quality, interval: u32) -> Option<String> {
-    let off = uneven(quality.wrong_surface_percent, [quality.psnr_mean, quality.psnr_min])?;
-    let cure = if interval > 1 { "--key-interval 1 keeps most of them" } else { "a slower path, or more --frames, keeps them" };
-    Some(format!(
-        "frame {} is {off:.1} dB worse than the mean: things that sweep past the camera are missing there; {cure}",
-        quality.worst_frame
-    ))
-}
 
 /// What the scene's loader warned of, and the pipeline itself.
 pub(super) fn of(origin: &Origin<'_>, quality: &Quality, interval: u32) -> Vec<String> {
@@ -48,21 +27,32 @@ fn surfaces(origin: &Origin<'_>) -> Option<String> {
     let lost = share(flat.atlas.gbuffer.label.iter().filter(|&&label| label != 0).count() as u64);
     if lost > LOST_PERCENT {
         return Some(format!(
-            "{lost:.0} % of what the camera sees of the scene is lost: its surfaces are too small on the screen for cells of {cell} x {cell} pixels; bring \
-             the camera nearer, raise --size, or try --cell 4 --key-interval 1 --sheets all"
+            "{lost:.0} % of what the camera sees of the scene is not shown: its surfaces are too small on the screen for cells of {cell} x {cell} pixels; \
+             bring the camera nearer, raise --size, or try --cell 4 --key-interval 1 --sheets all"
         ));
     }
     let cure = finer(cell, interval);
     let (or, cure) = match settings.error > 0.0 {
-        true => (", or is not worth its bytes there", format!("--sheets all keeps more such surfaces; {cure}")),
+        true => (", or that are not worth their bytes there", format!("--sheets all keeps more of them; {cure}")),
         false => ("", cure.to_owned()),
     };
     (dropped > DROPPED_PERCENT).then(|| {
         format!(
-            "{dropped:.2} % of the pixels show not their own surface but a neighbour of it; theirs covers too little of its cell of {cell} x {cell} pixels x \
-             {interval} frames{or}; {cure}"
+            "{dropped:.2} % of the pixels show a neighbour instead of their own surface; a cell of {cell} x {cell} pixels x {interval} frames leaves out \
+             surfaces that cover too little of it{or}; {cure}"
         )
     })
+}
+
+/// What keeps surfaces too small for cells of `cell` pixels and keys every `interval` frames.
+fn finer(cell: u32, interval: u32) -> &'static str {
+    match (cell, interval) {
+        (5.., 2..) => "a shorter --key-interval or smaller cells (--cell) keep them",
+        (5.., _) => "smaller cells (--cell) keep them",
+        // There are no smaller cells than of 4 pixels.
+        (_, 2..) => "a shorter --key-interval keeps them",
+        _ => "a larger --size keeps them",
+    }
 }
 
 /// A source image that is coarser than was asked for.
@@ -111,6 +101,16 @@ fn crossed(origin: &Origin<'_>) -> Option<String> {
 fn still(origin: &Origin<'_>) -> Option<String> {
     let play = &origin.scene.playback;
     (play.looping && play.frames == 1).then(|| "a looping path of one frame shows a single picture".to_owned())
+}
+
+/// A frame in which whole things are missing.
+fn missing(quality: &Quality, interval: u32) -> Option<String> {
+    let off = uneven(quality.wrong_surface_percent, [quality.psnr_mean, quality.psnr_min])?;
+    let cure = if interval > 1 { "--key-interval 1 keeps most of them" } else { "a slower path, or more --frames, keeps them" };
+    Some(format!(
+        "frame {} is {off:.1} dB worse than the mean: things that sweep past the camera are missing there; {cure}",
+        quality.worst_frame
+    ))
 }
 
 #[cfg(test)]
