@@ -209,7 +209,8 @@ pub(crate) fn choose(
             }
             Ok(Some(gained))
         })?;
-        if better.is_some() {
+        // On brief paths closer keys may be worth far more than the finer cells that were tried before them.
+        if better.is_some() && !brief {
             break;
         }
     }

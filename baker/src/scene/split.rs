@@ -12,7 +12,7 @@ const MOMENTS: u32 = 64;
 /// Triangles that are added, at most.
 const MOST: usize = 20_000;
 /// Times that an edge is cut in half, at most.
-const ROUNDS: usize = 16;
+const ROUNDS: usize = 32;
 
 /// `scene` with large triangles split; `None` where there are none, or too many. Triangles that share an edge are cut at the same point of it. Textures and
 /// the camera are those of `scene`, not copies.
