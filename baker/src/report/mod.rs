@@ -302,7 +302,7 @@ impl Report {
             work,
             torn_by_cause: encoded.torn_by_cause,
             effects: if flat.atlas.image.kind.colours() > 0 { vec!["palette".to_owned()] } else { Vec::new() },
-            warnings: warnings::of(origin, &quality, settings.key_interval),
+            warnings: warnings::of(origin, &quality),
         }
     }
 

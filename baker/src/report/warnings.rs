@@ -12,15 +12,15 @@ const DROPPED_PERCENT: f64 = 0.01;
 const LOST_PERCENT: f64 = 25.0;
 
 /// What the scene's loader warned of, and the pipeline itself.
-pub(super) fn of(origin: &Origin<'_>, quality: &Quality, interval: u32) -> Vec<String> {
+pub(super) fn of(origin: &Origin<'_>, quality: &Quality) -> Vec<String> {
     let own = [surfaces(origin), source_image(origin), shared_labels(origin), crossed(origin), still(origin)].into_iter().flatten();
-    origin.scene.warnings.iter().cloned().chain(own).chain(missing(quality, interval)).collect()
+    origin.scene.warnings.iter().cloned().chain(own).chain(missing(quality, closest(origin))).collect()
 }
 
 /// Surfaces that are not shown, because they are too small on the screen.
 fn surfaces(origin: &Origin<'_>) -> Option<String> {
     let Origin { flat, encoded, settings, .. } = origin;
-    let (cell, interval) = (settings.cell, settings.key_interval);
+    let (cell, interval) = (settings.cell, closest(origin));
     let share = |of: u64| 100.0 * encoded.dropped_pixels as f64 / of.max(1) as f64;
     let dropped = share(flat.rays);
     // Of those that show more than the backdrop.
@@ -42,6 +42,11 @@ fn surfaces(origin: &Origin<'_>) -> Option<String> {
              surfaces that cover too little of it{or}; {cure}"
         )
     })
+}
+
+/// Frames between keys, on the mean where they stand closer than asked for: on short paths and quick turns.
+fn closest(origin: &Origin<'_>) -> u32 {
+    origin.settings.key_interval.min(origin.encoded.grid.spacing())
 }
 
 /// What keeps surfaces too small for cells of `cell` pixels and keys every `interval` frames.
