@@ -282,7 +282,7 @@ impl Report {
         work: Work,
         seconds: Seconds,
     ) -> Self {
-        let Origin { scene, flat, encoded, settings, .. } = origin;
+        let Origin { scene, flat, encoded, .. } = origin;
         let play = &scene.playback;
         Self {
             scene: scene.name.clone(),
