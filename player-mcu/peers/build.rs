@@ -7,7 +7,7 @@ mod link;
 use std::path::Path;
 
 /// What the players play; `cubist-beside` makes them.
-const FILES: [&str; 5] = ["frames.raw", "warp.raw", "clip.gif", "clip.mjpeg", "clip.cubist"];
+const FILES: [&str; 6] = ["frames.raw", "warp.raw", "scene.mesh", "clip.gif", "clip.mjpeg", "clip.cubist"];
 
 fn main() -> std::io::Result<()> {
     let out = link::memory()?;

@@ -1,5 +1,5 @@
-//! `cubist-beside make TRUTH BUNDLE FRAMES FOLDER`: makes what the peers play of the antialiased frames in TRUTH (R, G, B; every so manieth
-//! of FRAMES) and of BUNDLE, and what they must show: into FOLDER.
+//! `cubist-beside make TRUTH MESH BUNDLE FRAMES FOLDER`: makes what the peers play of the antialiased frames in TRUTH (R, G, B; every so manieth
+//! of FRAMES), of the triangles in MESH and of BUNDLE, and what they must show: into FOLDER.
 //! `cubist-beside run TARGET PLAYER FIRMWARE CODE STATIC FOLDER RESULTS README`: plays a firmware in QEMU, holds its pixels against the host's, and
 //! puts the figures into RESULTS and the table of README. CODE is its bytes of flash with what it plays, STATIC those of static memory.
 //! `peers/run` calls both.
@@ -10,6 +10,8 @@ mod emulated;
 mod figures;
 mod make;
 mod qemu;
+#[path = "../../src/raster.rs"]
+mod raster;
 mod screen;
 #[path = "../../../bench/src/table.rs"]
 mod table;
@@ -24,7 +26,9 @@ use std::{env, fs};
 fn main() -> Result<()> {
     let arguments: Vec<String> = env::args().skip(1).collect();
     match arguments.iter().map(String::as_str).collect::<Vec<_>>().as_slice() {
-        ["make", truth, bundle, frames, folder] => make::all(Path::new(truth), Path::new(bundle), frames.parse()?, Path::new(folder)),
+        ["make", truth, mesh, bundle, frames, folder] => {
+            make::all([truth, mesh, bundle].map(Path::new), frames.parse()?, Path::new(folder))
+        }
         ["run", target, player, firmware, code, fixed, folder, results, readme] => {
             let expected = Expected::read(Path::new(folder), player)?;
             let played = qemu::play(Path::new(firmware)).with_context(|| format!("{player} on {target}"))?;
@@ -46,6 +50,8 @@ fn main() -> Result<()> {
             fs::write(results, serde_json::to_string_pretty(&all)? + "\n").with_context(|| (*results).to_owned())?;
             figures::write_table(Path::new(readme), &all)
         }
-        _ => bail!("usage: cubist-beside make TRUTH BUNDLE FRAMES FOLDER | run TARGET PLAYER FIRMWARE CODE STATIC FOLDER RESULTS README"),
+        _ => bail!(
+            "usage: cubist-beside make TRUTH MESH BUNDLE FRAMES FOLDER | run TARGET PLAYER FIRMWARE CODE STATIC FOLDER RESULTS README"
+        ),
     }
 }

@@ -3,6 +3,7 @@
 
 use crate::decode;
 use crate::figures::{Expected, decibels};
+use crate::raster::{self, Corner, Mesh, VERTICES};
 use crate::screen::{HEIGHT, PIXELS, WIDTH, cut, nearest, psnr, sum};
 use crate::warp::{self, Cells, NODE_ROWS, NODES};
 use anyhow::{Context, Result, anyhow, ensure};
@@ -22,7 +23,7 @@ const WARP_FRAMES: usize = 16;
 ///
 /// # Errors
 /// Files that cannot be read or written, or are not what they should be.
-pub fn all(truth: &Path, bundle: &Path, frames: u32, folder: &Path) -> Result<()> {
+pub fn all([truth, mesh, bundle]: [&Path; 3], frames: u32, folder: &Path) -> Result<()> {
     let rgb = fs::read(truth).with_context(|| truth.display().to_string())?;
     let truth: Vec<&[u8]> = rgb.chunks_exact(3 * PIXELS).collect();
     ensure!(!truth.is_empty(), "no frame of {WIDTH} x {HEIGHT} pixels in the truth");
@@ -40,6 +41,16 @@ pub fn all(truth: &Path, bundle: &Path, frames: u32, folder: &Path) -> Result<()
     let cubist = Expected::of(&played, &cubist, &truth, bytes.len(), "**Cubist**");
     let asked = cubist.psnr_db.context("a frame at least")?;
     expected.insert("cubist", cubist);
+
+    let content = fs::read(mesh).with_context(|| mesh.display().to_string())?;
+    write("scene.mesh", &content)?;
+    let words: Vec<i32> = content.as_chunks().0.iter().map(|&word| i32::from_le_bytes(word)).collect();
+    let scene = Mesh::new(&words).with_context(|| format!("{}: no triangles", mesh.display()))?;
+    let drawn = rasterised(&scene);
+    let compared: Vec<Vec<u16>> = drawn.iter().step_by(drawn.len().div_ceil(truth.len())).cloned().collect();
+    ensure!(drawn.len() == frames as usize && compared.len() == truth.len(), "{} cameras for {frames} frames", drawn.len());
+    let what = format!("a live rasteriser of {} triangles", scene.triangles.len());
+    expected.insert("raster", Expected::of(&drawn, &compared, &truth, content.len(), &what));
 
     let (content, pictures) = warp();
     write("warp.raw", &content)?;
@@ -96,6 +107,16 @@ fn played(bytes: &[u8], frames: u32, truth: usize) -> Result<[Vec<Vec<u16>>; 2]>
     let compared: Vec<Vec<u16>> = played.iter().step_by(every).cloned().collect();
     ensure!(compared.len() == truth, "{truth} frames of the truth are not every {every}th of {frames}");
     Ok([played, compared])
+}
+
+/// Every frame of a scene as the rasteriser draws it.
+fn rasterised(scene: &Mesh<'_>) -> Vec<Vec<u16>> {
+    let (mut seen, mut frame) = (Box::new([Corner::NEW; VERTICES]), Box::new(raster::Frame::NEW));
+    let draw = |camera| {
+        scene.draw(camera, &mut seen, &mut frame);
+        frame.colour.as_flattened().to_vec()
+    };
+    scene.cameras.iter().map(draw).collect()
 }
 
 /// Texture, palette and nodes of a picture that turns and swells, and its frames.
