@@ -24,7 +24,24 @@ pub fn reduced(name: &str, size: [u32; 2], frames: u32) -> Result<Scene> {
     Ok(scene)
 }
 
-/// Likewise without its sky, which is far away: what stands before it stands before the background.
+/// Likewise of what a command line says: the screen as `WxH`, and so many frames.
+///
+/// # Errors
+/// There is no scene of that name, or a number is none.
+pub fn asked(name: &str, size: &str, frames: &str) -> Result<Scene> {
+    let (width, height) = size.split_once('x').with_context(|| format!("expected WxH, found {size:?}"))?;
+    reduced(name, [number(width)?, number(height)?], number(frames)?)
+}
+
+/// A number of a command line.
+///
+/// # Errors
+/// It is none.
+pub fn number(text: &str) -> Result<u32> {
+    text.parse().with_context(|| format!("expected a number, found {text:?}"))
+}
+
+/// Like [`reduced`], without its sky, which is far away: what stands before it stands before the background.
 ///
 /// # Errors
 /// There is no scene of that name.

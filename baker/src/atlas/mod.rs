@@ -21,6 +21,7 @@ use crate::scene::{Background, Scene};
 use crate::shade::Shader;
 use cubist_core::format::{MOST_FINER, TexelKind};
 pub use outline::{Outline, Tiled};
+pub use palette::widened;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;

@@ -18,7 +18,8 @@ const REFILLS: usize = 8;
 const CHROMA: f64 = 1.25;
 
 /// The RGB565 value nearest to a colour, widened by repeating its leading bits.
-pub(crate) fn widened([r, g, b]: [u8; 3]) -> [u8; 3] {
+#[must_use]
+pub fn widened([r, g, b]: [u8; 3]) -> [u8; 3] {
     let five = |v: u8| {
         let q = ((u16::from(v) * 31 + 127) / 255) as u8;
         (q << 3) | (q >> 2)

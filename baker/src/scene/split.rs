@@ -134,7 +134,12 @@ mod tests {
 
     /// A floor of two triangles, 64 on a side, over which the camera flies at this height.
     fn floor(height: f64) -> Scene {
-        let corner = |x: f64, z: f64| DVec3::new(32.0 * x, 0.0, 32.0 * z);
+        wide(64.0, height)
+    }
+
+    /// Likewise of another size.
+    fn wide(side: f64, height: f64) -> Scene {
+        let corner = |x: f64, z: f64| 0.5 * side * DVec3::new(x, 0.0, z);
         let triangle = |position: [DVec3; 3]| Triangle {
             position,
             normal: [Vec3::Y; 3],
@@ -185,5 +190,13 @@ mod tests {
         assert!(split(&floor(200.0)).is_none());
         let parts = split(&floor(1e-9)).expect("it is large").triangles;
         assert!((1000..=2 + MOST).contains(&parts.len()), "{}", parts.len());
+    }
+
+    #[test]
+    fn floors_a_million_times_as_wide_as_the_camera_is_high_are_cut_on() {
+        let scene = wide(2e6, 2.0);
+        let parts = split(&scene).expect("it is large").triangles;
+        let eyes = Eyes::new(&scene);
+        assert!(parts.iter().all(|t| eyes.cuts(t) == [false; 3]), "none is large");
     }
 }

@@ -2,7 +2,8 @@
 //! good; a depth of sixteen bits a pixel; backs left out; clipped to what the camera sees. Triangles come from `mesh`, the nearest first, so that
 //! what they hide costs a look at its depth. `cubist-beside` runs the same code to know the pixels.
 //!
-//! Divisions are what small processors lack: there is one a vertex that is seen, four a triangle, and one every sixteen pixels.
+//! Divisions are what small processors lack: there is one a vertex that is seen; four a triangle, and three more where it is straight, or else one at the
+//! start of each of its rows and one every sixteen pixels.
 
 /// Pixels a row.
 const WIDTH: usize = 320;
@@ -128,15 +129,15 @@ impl<'a> Mesh<'a> {
         let [near, far] = [a.near.max(b.near).max(c.near), a.near.min(b.near).min(c.near)];
         if near - far < near >> 5 {
             // As far away all over: straight, it is off by a hundredth of its size.
-            self.sorted::<true>(frame, [a, b, c].map(Point::straight));
+            self.front::<true>(frame, [a, b, c].map(Point::straight));
         } else {
-            self.sorted::<false>(frame, [a, b, c]);
+            self.front::<false>(frame, [a, b, c]);
         }
     }
 
     /// Draws a triangle whose front is seen; `STRAIGHT`: without perspective.
     #[inline(always)]
-    fn sorted<const STRAIGHT: bool>(&self, frame: &mut Frame, [a, b, c]: [Point; 3]) {
+    fn front<const STRAIGHT: bool>(&self, frame: &mut Frame, [a, b, c]: [Point; 3]) {
         let sorted = |a: Point, b: Point| if b.y < a.y { (b, a) } else { (a, b) };
         let (a, b) = sorted(a, b);
         let (b, c) = sorted(b, c);

@@ -11,13 +11,11 @@ fn main() -> Result<()> {
     let [name, size, frames, every, file] = arguments.as_slice() else {
         bail!("usage: clip SCENE WxH FRAMES EVERY FILE");
     };
-    let number = |text: &str| text.parse::<u32>().with_context(|| format!("expected a number, found {text:?}"));
-    let (width, height) = size.split_once('x').with_context(|| format!("expected WxH, found {size:?}"))?;
-    let (frames, every) = (number(frames)?, number(every)?.max(1));
-    let scene = scenes::reduced(name, [number(width)?, number(height)?], frames)?;
+    let scene = scenes::asked(name, size, frames)?;
+    let every = scenes::number(every)?.max(1);
     let truth = Truth::new(&scene);
     let mut out = std::fs::File::create(file).with_context(|| file.clone())?;
-    for frame in (0..frames).step_by(every as usize) {
+    for frame in (0..scene.playback.frames).step_by(every as usize) {
         out.write_all(&truth.frame(frame)).with_context(|| file.clone())?;
     }
     Ok(())

@@ -2,7 +2,9 @@
 //! in numbers of 32 bits, little-endian. `player-mcu/peers/run` links it into the live rasteriser that stands beside Cubist.
 
 use anyhow::{Context, Result, bail, ensure};
+use cubist_baker::atlas::widened;
 use cubist_baker::camera::Pose;
+use cubist_baker::encode::rgb565;
 use cubist_baker::scene::Scene;
 use cubist_tests::scenes;
 use glam::DVec3;
@@ -20,10 +22,7 @@ fn main() -> Result<()> {
     let [name, size, frames, file] = arguments.as_slice() else {
         bail!("usage: mesh SCENE WxH FRAMES FILE");
     };
-    let number = |text: &str| text.parse::<u32>().with_context(|| format!("expected a number, found {text:?}"));
-    let (width, height) = size.split_once('x').with_context(|| format!("expected WxH, found {size:?}"))?;
-    let scene = scenes::reduced(name, [number(width)?, number(height)?], number(frames)?)?;
-    let words = words(&scene)?;
+    let words = words(&scenes::asked(name, size, frames)?)?;
     std::fs::write(file, words.iter().flat_map(|word| word.to_le_bytes()).collect::<Vec<u8>>()).with_context(|| file.clone())
 }
 
@@ -53,7 +52,7 @@ fn words(scene: &Scene) -> Result<Vec<i32>> {
     words.extend(poses.iter().flat_map(|pose| camera(pose, [scene.playback.width, scene.playback.height])));
     words.extend(vertices.iter().flatten());
     words.extend(triangles.iter().flat_map(|(_, corners)| corners));
-    let texels: Vec<u16> = texture.texels.iter().map(|&[r, g, b, _]| nearest([r, g, b])).collect();
+    let texels: Vec<u16> = texture.texels.iter().map(|&[r, g, b, _]| rgb565(widened([r, g, b]))).collect();
     words.extend(texels.as_chunks().0.iter().map(|&[even, odd]| (u32::from(odd) << 16 | u32::from(even)) as i32));
     Ok(words)
 }
@@ -70,10 +69,4 @@ fn camera(pose: &Pose, size: [u32; 2]) -> [i32; 12] {
 
 fn fixed(x: f64, bits: i32) -> i32 {
     libm::round(libm::scalbn(x, bits)) as i32
-}
-
-/// The nearest colour of RGB565.
-fn nearest([r, g, b]: [u8; 3]) -> u16 {
-    let scale = |value: u8, most: u32| ((u32::from(value) * most * 2 + 255) / 510) as u16;
-    scale(r, 31) << 11 | scale(g, 63) << 5 | scale(b, 31)
 }
