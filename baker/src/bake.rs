@@ -80,6 +80,23 @@ pub enum BakeError {
         /// What else helps: leaving options to the search that are given; empty where none is.
         held: String,
     },
+    /// No bundle that a search found is small enough and plays in the memory there is as well.
+    #[error(
+        "--budget and --ram: expected a bundle of at most {budget} bytes that plays in {room}, found one of {bytes} that plays in {memory}, the nearest \
+         that was tried; raise what is short, or lower --size or --frames{held}"
+    )]
+    Both {
+        /// Bytes allowed.
+        budget: u64,
+        /// Bytes of working memory allowed.
+        room: usize,
+        /// Bytes of the bundle that came nearest,
+        bytes: u64,
+        /// and of its working memory.
+        memory: usize,
+        /// What else helps: leaving options to the search that are given; empty where none is.
+        held: String,
+    },
     /// The model has no flattening of its own.
     #[error(transparent)]
     Own(#[from] chart::NoIslands),

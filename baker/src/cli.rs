@@ -189,20 +189,22 @@ pub struct Bake {
     /// The whole bundle takes at most this many bytes (also 256K, 2M), at the best quality that does.
     ///
     /// Quality is measured against the antialiased scene; cells, keys and the source image are searched. What is baked without a budget is taken
-    /// where it fits and shows more.
-    #[arg(long, value_name = "BYTES", value_parser = budget, allow_negative_numbers = true, conflicts_with_all = ["psnr", "ram"])]
+    /// where it fits and shows more. With --ram the bundle plays in that memory as well.
+    #[arg(long, value_name = "BYTES", value_parser = budget, allow_negative_numbers = true, conflicts_with = "psnr")]
     pub budget: Option<u64>,
     /// The smallest bundle whose mean PSNR against exact rays through its source image reaches this many dB.
     ///
     /// Cells and keys are searched; the source image stays as --atlas and --density ask, and gets coarser only where nothing
-    /// else reaches the goal. What is baked without a goal is taken where it reaches this one in fewer bytes.
-    #[arg(long, value_name = "DB", value_parser = psnr, allow_negative_numbers = true, conflicts_with = "ram")]
+    /// else reaches the goal. What is baked without a goal is taken where it reaches this one in fewer bytes. With --ram the bundle plays in that
+    /// memory as well.
+    #[arg(long, value_name = "DB", value_parser = psnr, allow_negative_numbers = true)]
     pub psnr: Option<f64>,
     /// Playing takes at most this many bytes of working memory (also 48K), at the best quality that does.
     ///
     /// A bundle that needs no more stays as it is. Else linear --time, linear --space, larger cells and closer keys are tried, each unless it is
     /// given (a given cell may grow all the same), and from what fits on to what is worth more; what was given up is said at the end. A row of
-    /// pixels comes on top: two bytes each. Where flash is short as well, lower --atlas or --density beside it.
+    /// pixels comes on top: two bytes each. Where flash is short as well, --budget goes with it, and --psnr where quality is given: both keep a given
+    /// cell, and search linear --time and --space beside the rest.
     #[arg(long, value_name = "BYTES", value_parser = budget, allow_negative_numbers = true)]
     pub ram: Option<u64>,
     /// Writes bytes, seconds, quality and warnings as JSON.
@@ -307,11 +309,11 @@ impl Bake {
     /// The baker's options.
     #[must_use]
     pub fn options(&self, load_seconds: f64) -> Options {
-        let goal = match (self.budget, self.psnr, self.ram) {
-            (Some(budget), ..) => Some(Goal::Budget(budget)),
-            (None, Some(psnr), _) => Some(Goal::Psnr(psnr)),
-            (None, None, Some(ram)) => Some(Goal::Ram(usize::try_from(ram).unwrap_or(usize::MAX))),
-            (None, None, None) => None,
+        let ram = self.ram.map(|ram| usize::try_from(ram).unwrap_or(usize::MAX));
+        let goal = match (self.budget, self.psnr) {
+            (Some(budget), _) => Some(Goal::Budget(budget)),
+            (None, Some(psnr)) => Some(Goal::Psnr(psnr)),
+            (None, None) => ram.map(Goal::Ram),
         };
         let time = |time| match time {
             Time::Hold => TIME_HOLD,
@@ -366,6 +368,7 @@ impl Bake {
             all_sheets: self.sheets == Sheets::All,
             plain: self.paint == Paint::Surface,
             goal,
+            room: ram.filter(|_| !matches!(goal, Some(Goal::Ram(_)))),
             truth: self.truth,
             load_seconds,
         }
@@ -506,7 +509,12 @@ mod tests {
         assert_eq!((options.goal, options.truth, options.load_seconds), (Some(Goal::Budget(65_536)), TruthFrames::All, 0.5));
         let wanted = ["cubist-bake", "a.glb", "-o", "a.cubist", "--ram", "16K", "--time", "linear", "--space", "cubic", "--even-keys"];
         let options = Cli::try_parse_from(wanted).unwrap().bake.options(0.0);
-        assert_eq!((options.goal, options.even_keys), (Some(Goal::Ram(16_384)), true));
+        assert_eq!((options.goal, options.room, options.even_keys), (Some(Goal::Ram(16_384)), None, true));
+        for (beside, goal) in [(["--budget", "64K"], Goal::Budget(65_536)), (["--psnr", "30"], Goal::Psnr(30.0))] {
+            let wanted = ["cubist-bake", "a.glb", "-o", "a.cubist", "--ram", "16K"].into_iter().chain(beside);
+            let options = Cli::try_parse_from(wanted).unwrap().bake.options(0.0);
+            assert_eq!((options.goal, options.room), (Some(goal), Some(16_384)));
+        }
         assert_eq!((options.time, options.space), (Some(TIME_LINEAR), Some(SPACE_CUBIC)));
         let packed = Cli::try_parse_from(["cubist-bake", "a.glb", "-o", "a.cubist", "--storage", "packed"]).unwrap().bake.options(0.0);
         assert_eq!((packed.source().storage, packed.source().outline), (atlas::Storage::Packed, None));
@@ -528,8 +536,6 @@ mod tests {
         for wrong in [
             &["cubist-bake", "a.toml"][..],
             &["cubist-bake", "a.toml", "-o", "b", "--budget", "1K", "--psnr", "30"],
-            &["cubist-bake", "a.toml", "-o", "b", "--budget", "1K", "--ram", "30K"],
-            &["cubist-bake", "a.toml", "-o", "b", "--ram", "30K", "--psnr", "30"],
             &["cubist-bake", "a.toml", "-o", "b", "--time", "square"],
             &["cubist-bake", "a.toml", "-o", "b", "--space", "hold"],
             &["cubist-bake", "a.toml", "-o", "b", "--storage", "zip"],

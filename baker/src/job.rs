@@ -5,6 +5,7 @@ use crate::atlas;
 use crate::bake::{self, BakeError, Fitted, Flat, Progress, Settings, something_seen};
 pub use crate::baked::Baked;
 use crate::bends::Bends;
+use crate::budget;
 use crate::cast::Cast;
 use crate::chart::{self, Choice, Family};
 use crate::choose;
@@ -65,7 +66,7 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
         && baked.settings.atlas.storage != options.source().storage
     {
         // By what it takes with the outline that was chosen for it.
-        baked.report.warnings.push(tune::packed(budget, baked.report.memory.picture));
+        baked.report.warnings.push(budget::packed(budget, baked.report.memory.picture));
     }
     // Whatever was not for this bundle was for finding it.
     let (seconds, total) = (&mut baked.report.seconds, options.load_seconds + tracer.seconds + start.elapsed().as_secs_f64());
@@ -89,7 +90,7 @@ fn toward(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Res
         },
         Goal::Budget(_) | Goal::Psnr(_) => {
             let found = once(tracer, options, None, progress);
-            usual::or_found((goal, options.source().storage), &Seen::new(tracer, None), found, |storage| usual(Some(storage)))
+            usual::or_found((goal, options.room, options.source().storage), &Seen::new(tracer, None), found, |storage| usual(Some(storage)))
         }
     }
 }
@@ -189,7 +190,7 @@ fn bettered(
     progress: Progress<'_>,
 ) -> Result<Bettered, BakeError> {
     let usual = made.settings;
-    let (made, outlines) = outlines::choose(scene, flat, fitted, made, options.budget(), progress)?;
+    let (made, outlines) = outlines::choose(scene, flat, fitted, made, options.limits(), progress)?;
     if options.goal.is_some() {
         return Ok(Bettered { made, outlines, spaces: Vec::new(), why: None });
     }

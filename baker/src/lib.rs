@@ -9,6 +9,7 @@ pub mod bake;
 mod baked;
 pub mod bends;
 mod brinks;
+mod budget;
 pub mod camera;
 pub mod cast;
 pub mod causes;

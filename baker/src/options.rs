@@ -20,6 +20,23 @@ pub enum Goal {
     Ram(usize),
 }
 
+/// What a bundle has to keep within.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Limits {
+    /// Its bytes,
+    pub bytes: Option<u64>,
+    /// and those of working memory for playing it.
+    pub memory: Option<usize>,
+}
+
+impl Limits {
+    /// By how many bytes of either kind a bundle of so many `bytes` that plays in so much `memory` is too large.
+    pub fn over(&self, bytes: u64, memory: usize) -> u64 {
+        let flash = self.bytes.map_or(0, |most| bytes.saturating_sub(most));
+        flash + self.memory.map_or(0, |most| memory.saturating_sub(most) as u64)
+    }
+}
+
 /// The frames to compare with the antialiased scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TruthFrames {
@@ -64,6 +81,8 @@ pub struct Options {
     pub plain: bool,
     /// What to reach; `None`: what the settings give.
     pub goal: Option<Goal>,
+    /// Bytes of working memory that playing may take beside another goal than [`Goal::Ram`]; `None`: a search takes what is usual.
+    pub room: Option<usize>,
     /// How much is compared with the truth.
     pub truth: TruthFrames,
     /// Seconds that reading the scene took, for the report.
@@ -88,6 +107,7 @@ impl Default for Options {
             all_sheets: false,
             plain: false,
             goal: None,
+            room: None,
             truth: TruthFrames::Most(16),
             load_seconds: 0.0,
         }
@@ -129,17 +149,28 @@ impl Options {
         if let Some(Goal::Budget(budget)) = self.goal { Some(budget) } else { None }
     }
 
-    /// What else helps where a search finds nothing: to leave to it what is given; nothing where nothing is. `cells`: the search would try other
-    /// cells than the one that is given.
-    pub(crate) fn held(&self, cells: bool) -> String {
+    /// What the bundle has to keep within.
+    pub(crate) fn limits(&self) -> Limits {
+        let memory = if let Some(Goal::Ram(room)) = self.goal { Some(room) } else { self.room };
+        Limits { bytes: self.budget(), memory }
+    }
+
+    /// What else helps where a search finds nothing: to leave to it what is given; nothing where nothing is.
+    pub(crate) fn held(&self) -> String {
+        // Where memory is all that matters, cells grow beyond the one that is given.
+        let (cells, memory) = (!matches!(self.goal, Some(Goal::Ram(_))), self.limits().memory.is_some());
         let all = [
             (cells && self.cell.is_some(), "--cell"),
             (self.key_interval.is_some(), "--key-interval"),
-            (!cells && self.time.is_some(), "--time"),
-            (!cells && self.space.is_some(), "--space"),
-            (!cells && self.storage == Some(Storage::Packed), "--storage"),
+            (memory && self.time.is_some(), "--time"),
+            (memory && self.space.is_some(), "--space"),
+            (memory && self.storage == Some(Storage::Packed), "--storage"),
         ];
         let given: Vec<&str> = all.into_iter().filter_map(|(given, name)| given.then_some(name)).collect();
-        if given.is_empty() { String::new() } else { format!(", or leave {} to the search", given.join(" and ")) }
+        let mut held = if given.is_empty() { String::new() } else { format!(", or leave {} to the search", given.join(" and ")) };
+        if matches!(self.goal, Some(Goal::Psnr(_))) && self.room.is_some() {
+            held.push_str(", or raise --ram");
+        }
+        held
     }
 }

@@ -6,9 +6,11 @@ use crate::bake::{self, BakeError, Fitted, Flat, Progress};
 use crate::finer;
 use crate::made::Made;
 use crate::metrics;
+use crate::options::Limits;
 use crate::scene::Scene;
 use crate::spare::DOUBLE;
 use crate::terminal::grouped;
+use crate::verify;
 use serde::{Deserialize, Serialize};
 
 /// One outline, tried.
@@ -33,7 +35,7 @@ impl Trial {
 }
 
 /// `usual`, or what is made of the scene with a finer outline if that is worth more, which `flat` then has; and all that were tried, the finest last:
-/// one that is worth less than the one before is the last. Within a `budget` of bytes quality alone counts. `fitted`: what `usual` came from, if that
+/// one that is worth less than the one before is the last. Within `limits` of bytes quality alone counts. `fitted`: what `usual` came from, if that
 /// is at hand.
 ///
 /// # Errors
@@ -43,7 +45,7 @@ pub(crate) fn choose(
     flat: &mut Flat,
     fitted: Option<Fitted>,
     usual: Made,
-    budget: Option<u64>,
+    limits: Limits,
     progress: Progress<'_>,
 ) -> Result<(Made, Vec<Trial>), BakeError> {
     let finer = std::mem::take(&mut flat.atlas.finer);
@@ -52,7 +54,7 @@ pub(crate) fn choose(
     }
     let fitted = fitted.map_or_else(|| bake::fitted(scene, flat, &usual.settings, progress), Ok)?;
     let mut trials = vec![Trial::new(&flat.atlas.image.outline, &usual)];
-    let worth = |trial: &Trial| if budget.is_some() { trial.psnr } else { trial.worth() };
+    let worth = |trial: &Trial| if limits.bytes.is_some() { trial.psnr } else { trial.worth() };
     let (count, mut best) = (finer.len(), (worth(&trials[0]), flat.atlas.image.outline.clone(), usual));
     for (done, outline) in finer.into_iter().enumerate() {
         progress("trying outlines", done as f64 / count as f64);
@@ -61,7 +63,8 @@ pub(crate) fn choose(
         flat.atlas.image.outline = outline.clone();
         let made = Made::of(scene, flat, &fitted, settings)?;
         let trial = Trial::new(&outline, &made);
-        let (worth, fits) = (worth(&trial), budget.is_none_or(|budget| trial.bytes as u64 <= budget));
+        let fits = limits.over(trial.bytes as u64, verify::memory(&made.encoded.bundle)?) == 0;
+        let worth = worth(&trial);
         trials.push(trial);
         if worth <= best.0 || !fits {
             break;
@@ -98,7 +101,7 @@ mod tests {
         let mut flat = bake::flatten(&scene, &settings.atlas, &|_, _| {}).unwrap();
         let fitted = bake::fitted(&scene, &flat, &settings, &|_, _| {}).unwrap();
         let usual = Made::of(&scene, &flat, &fitted, settings).unwrap();
-        let (made, trials) = choose(&scene, &mut flat, Some(fitted), usual, budget, &|_, _| {}).unwrap();
+        let (made, trials) = choose(&scene, &mut flat, Some(fitted), usual, Limits { bytes: budget, memory: None }, &|_, _| {}).unwrap();
         (flat.atlas.image.outline.finer, flat, made, trials)
     }
 

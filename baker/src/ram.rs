@@ -97,7 +97,7 @@ impl Search<'_> {
         }
         let Some((Value { psnr, .. }, tried)) = found.best else {
             return Err(match found.smallest {
-                Some(smallest) => BakeError::Ram { asked: room, smallest, held: self.options.held(false) },
+                Some(smallest) => BakeError::Ram { asked: room, smallest, held: self.options.held() },
                 // Not a single bundle: what was in the way is the answer.
                 None => found.exceeded.unwrap_or(BakeError::Ram { asked: room, smallest: 0, held: String::new() }),
             });

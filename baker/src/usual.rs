@@ -9,28 +9,29 @@ use crate::seen::Seen;
 use crate::tune::MOST_MEMORY;
 
 /// What a search for `goal` `found`, or the `usual` bundle, stored as it has to be, where that reaches the goal better: within a budget of bytes with more
-/// quality beside what is `seen`, or a quality with fewer bytes. In memory that searches would not take either it is no answer. `asked`: how it is
-/// stored where nothing has to give.
+/// quality beside what is `seen`, or a quality with fewer bytes. In more memory than there is `room`, or than searches would take either, it is no answer.
+/// `asked`: how it is stored where nothing has to give.
 ///
 /// # Errors
 /// What the search came to, where the usual bundle does not reach the goal either; those of the player.
 pub(crate) fn or_found(
-    (goal, asked): (Goal, Storage),
+    (goal, room, asked): (Goal, Option<usize>, Storage),
     seen: &Seen<'_>,
     found: Result<Baked, BakeError>,
     usual: impl FnOnce(Storage) -> Result<Baked, BakeError>,
 ) -> Result<Baked, BakeError> {
+    let reached = |usual: &Baked, most: usize| reaches(goal, usual) && usual.report.memory.workspace <= most;
     let found = match found {
         // Whatever else is wrong is wrong with both.
-        Err(error @ BakeError::Psnr { .. }) => {
-            return usual(asked).ok().filter(|usual| reaches(goal, usual)).ok_or(error);
+        Err(error @ (BakeError::Psnr { .. } | BakeError::Ram { .. })) => {
+            return usual(asked).ok().filter(|usual| reached(usual, room.unwrap_or(usize::MAX))).ok_or(error);
         }
         found => found?,
     };
     let Some(storage) = found.contested else { return Ok(found) };
     let Ok(usual) = usual(storage) else { return Ok(found) };
-    let memory = found.report.memory.workspace.max(MOST_MEMORY);
-    let wins = reaches(goal, &usual) && usual.report.memory.workspace <= memory && better(goal, seen, &usual, &found)?;
+    let most = room.unwrap_or(found.report.memory.workspace.max(MOST_MEMORY));
+    let wins = reached(&usual, most) && better(goal, seen, &usual, &found)?;
     Ok(if wins { usual } else { found })
 }
 

@@ -1,0 +1,344 @@
+//! Budget: the best bundle of at most a number of bytes, which may have to play in a number of bytes of memory too.
+//! Rays and options come from `tune`; the choice goes back there. Source images and ways to code keys are measured apart, then the pairs that promise most
+//! are baked.
+
+use crate::atlas::{self, Storage};
+use crate::bake::{BakeError, Encoded, Flat, Settings, Sparing};
+use crate::climb::{Free, Step, Take, climb};
+use crate::encode::{image_bytes, raw_bytes};
+use crate::samples::Samples;
+use crate::terminal::grouped;
+use crate::tune::{Chosen, DENSITIES, MOST_MEMORY, STEPS, Search, possible};
+use crate::verify;
+
+/// What a bit is worth at first in the search for a budget.
+const BUDGET_LAMBDA: f32 = 0.1;
+/// Source images tried, at most.
+const IMAGES: usize = 1 + DENSITIES.len();
+/// Bundles that fit the budget and are measured, before the best of them is bettered step by step.
+const TRIES: usize = 4;
+/// How far a predicted size may lie over the budget and still be tried: coarser keys take less.
+const SLACK: f64 = 1.15;
+
+/// A source image, measured.
+struct Image {
+    source: atlas::Settings,
+    /// Bytes stored as asked for; packed, if that is left to the search.
+    bytes: usize,
+    packed: Option<usize>,
+    /// Bytes that it takes of memory where it is packed.
+    unpacked: usize,
+    /// Mean squared error of exact rays through it against the truth.
+    error: f64,
+}
+
+/// What of `source` says how fine the image is.
+fn fineness(source: &atlas::Settings) -> [f64; 2] {
+    [source.density, source.detail]
+}
+
+impl Image {
+    /// The fewest bytes that it can take.
+    fn least(&self) -> usize {
+        self.packed.map_or(self.bytes, |packed| packed.min(self.bytes))
+    }
+
+    /// Whether it has to be packed to fit into `budget` with `keys`: what fits as it is plays from flash.
+    fn has_to_be_packed(&self, keys: &Keys, budget: u64) -> bool {
+        (self.bytes + keys.bytes) as u64 > budget && self.least() < self.bytes
+    }
+
+    /// Bytes of a bundle with `keys`, and how the image is stored in it.
+    fn with(&self, keys: &Keys, budget: u64) -> (usize, atlas::Settings) {
+        if self.has_to_be_packed(keys, budget) {
+            (self.least() + keys.bytes, atlas::Settings { storage: Storage::Packed, ..self.source })
+        } else {
+            (self.bytes + keys.bytes, self.source)
+        }
+    }
+
+    /// Bytes of working memory for playing that bundle.
+    fn memory(&self, keys: &Keys, budget: u64) -> usize {
+        let (_, source) = self.with(keys, budget);
+        keys.memory + if source.storage == Storage::Packed { self.unpacked } else { 0 }
+    }
+}
+
+/// The source images that a search for a budget has to choose from.
+struct Images {
+    all: Vec<Image>,
+    /// The finest that leaves room for keys, or else the coarsest: keys are measured at this one.
+    reference: Flat,
+    /// Bytes of the one that is as fine as asked for; packed, if that is left to the search.
+    usual: (usize, Option<usize>),
+}
+
+/// A way to code keys, measured at one source image.
+#[derive(Clone, Copy)]
+struct Keys {
+    settings: Settings,
+    bytes: usize,
+    /// Bytes of working memory, but for an unpacked source image.
+    memory: usize,
+    /// What playback adds to the mean squared error against the truth.
+    error: f64,
+}
+
+impl Search<'_> {
+    /// The best bundle of at most `budget` bytes.
+    ///
+    /// Source images and grids are measured apart, then the sums of their bytes and of their errors say which pairs to bake.
+    pub(crate) fn budget(&self, budget: u64) -> Result<Chosen, BakeError> {
+        let steps = IMAGES + self.grids(self.options.source()).len() + TRIES + STEPS;
+        let samples = Samples::new(self.cast);
+        let Images { all: images, reference, usual } = self.images(budget, &samples, steps)?;
+        let keys = self.keys(&reference, &samples, steps)?;
+        drop(reference);
+        let mut pairs: Vec<(&Image, &Keys)> = images.iter().flat_map(|image| keys.iter().map(move |keys| (image, keys))).collect();
+        pairs.sort_by(|a, b| {
+            let error = |(image, keys): &(&Image, &Keys)| image.error + keys.error;
+            error(a).total_cmp(&error(b)).then(a.0.with(a.1, budget).0.cmp(&b.0.with(b.1, budget).0))
+        });
+        let chosen = self.best_pair(budget, &pairs, &samples, steps)?;
+        // Half of what its keys take here may go as they are settled.
+        let base = self.options.settings(self.scene.playback.width);
+        let own = keys.iter().find(|keys| (keys.settings.cell, keys.settings.key_interval) == (base.cell, base.key_interval));
+        let fits = |image: usize| (image + own.map_or(0, |own| own.bytes / 2)) as u64 <= budget;
+        let contested = match usual {
+            (bytes, _) if fits(bytes) => Some(base.atlas.storage),
+            (_, Some(packed)) if fits(packed) => Some(Storage::Packed),
+            _ => None,
+        };
+        Ok(Chosen { contested, ..chosen })
+    }
+
+    /// Measures source images, the finest first, but for those that are far too large for `budget`.
+    fn images(&self, budget: u64, samples: &Samples, steps: usize) -> Result<Images, BakeError> {
+        let room = usize::try_from(budget).unwrap_or(usize::MAX);
+        let asked = self.options.source();
+        let (mut images, mut reference, mut usual): (Vec<Image>, _, _) = (Vec::new(), None, None);
+        let all = self.options.detail.is_none().then_some((f64::INFINITY, 1.0));
+        let mut scale = 1.0;
+        for (step, (detail, ratio)) in all.into_iter().chain(DENSITIES.map(|ratio| (asked.detail, ratio))).enumerate() {
+            self.say(step, steps);
+            let source = atlas::Settings { density: asked.density * scale * ratio, detail, ..asked };
+            let coarsest = ratio == DENSITIES[DENSITIES.len() - 1];
+            let finer = |last: &Image| source.density / last.source.density;
+            if let Some(last) = images.last()
+                && last.source.detail == detail
+                && !coarsest
+                && last.least() as f64 * finer(last) * finer(last) > 1.5 * room as f64
+            {
+                continue;
+            }
+            let flat = self.flat(source)?;
+            let packed = self.options.storage.is_none().then(|| image_bytes(&flat.atlas.image, Storage::Packed));
+            let bytes = image_bytes(&flat.atlas.image, source.storage);
+            if detail == asked.detail && ratio == 1.0 {
+                // Where the image is full, densities above what it holds change nothing.
+                scale = flat.atlas.figures.scale.min(1.0);
+                usual = Some((bytes, packed));
+            }
+            let unpacked = raw_bytes(&flat.atlas.image);
+            let image = Image { source, bytes, packed, unpacked, error: samples.of_image(&flat.atlas) };
+            if reference.is_none() && (image.least() < room / 10 * 9 || coarsest) {
+                reference = Some(flat);
+            }
+            // A flattening of the scene's own has all its detail as it is.
+            if !images.last().is_some_and(|last| (last.bytes, last.error) == (image.bytes, image.error)) {
+                images.push(image);
+            }
+        }
+        match (reference, usual) {
+            (Some(reference), Some(usual)) => Ok(Images { all: images, reference, usual }),
+            _ => Err(BakeError::Budget { budget, smallest: u64::MAX }),
+        }
+    }
+
+    /// Measures every way to code keys at one source image.
+    fn keys(&self, flat: &Flat, samples: &Samples, steps: usize) -> Result<Vec<Keys>, BakeError> {
+        let asked = self.options.source();
+        let (image_bytes, image_error) = (image_bytes(&flat.atlas.image, asked.storage), samples.of_image(&flat.atlas));
+        let packed = asked.storage == Storage::Packed;
+        let (mut keys, mut exceeded) = (Vec::<Keys>::new(), None);
+        for mut settings in self.grids(asked) {
+            self.say(IMAGES + keys.len(), steps);
+            settings.coding = settings.coding.worth(BUDGET_LAMBDA);
+            // The last grid's error is about this one's, and a little more.
+            settings.error = self.prunes(keys.last().map_or(0.0, |keys| keys.error));
+            let Some(Encoded { bundle, .. }) = possible(self.encode(flat, &settings), &mut exceeded)? else { continue };
+            let (error, _) = samples.of_bundle(&bundle)?;
+            let (bytes, unpacked) = (bundle.len().saturating_sub(image_bytes), if packed { raw_bytes(&flat.atlas.image) } else { 0 });
+            let memory = verify::memory(&bundle)?.saturating_sub(unpacked);
+            keys.push(Keys { settings, bytes, memory, error: (error - image_error).max(0.0) });
+        }
+        exceeded.filter(|_| keys.is_empty()).map_or(Ok(keys), Err)
+    }
+
+    /// Bakes the `pairs` that promise most until enough of them fit, and steps on from the best.
+    fn best_pair(&self, budget: u64, pairs: &[(&Image, &Keys)], samples: &Samples, steps: usize) -> Result<Chosen, BakeError> {
+        let mut current: Option<([f64; 2], Flat)> = None;
+        let mut exceeded = None;
+        let mut best: Option<(Settings, f64)> = None;
+        let (limits, mut nearest) = (self.options.limits(), (u64::MAX, 0, 0));
+        let (mut fitting, mut room) = (0, MOST_MEMORY);
+        // Of bundles that fit the better one counts, of those that do not the smaller one: from there steps may lead to one that does.
+        let mut score = |flat: &Flat, settings: &Settings, first: bool| -> Result<Option<f64>, BakeError> {
+            let Some(Encoded { bundle, .. }) = possible(self.encode(flat, settings), &mut exceeded)? else { return Ok(None) };
+            let (bytes, memory) = (bundle.len() as u64, verify::memory(&bundle)?);
+            let over = limits.over(bytes, memory);
+            nearest = nearest.min((over, bytes, memory));
+            if over > 0 {
+                return Ok(Some(-(over as f64)));
+            }
+            // What is there may be used.
+            room = if first || limits.memory.is_some() { room.max(memory) } else { room };
+            Ok(if memory <= room { Some(samples.of_bundle(&bundle)?.1) } else { None })
+        };
+        let mut pairs = pairs.to_vec();
+        let plays = |(image, keys): &(&Image, &Keys)| limits.memory.is_none_or(|room| image.memory(keys, budget) <= room);
+        if pairs.iter().any(plays) {
+            pairs.retain(plays);
+        }
+        // Where nothing is predicted to fit, the smallest prediction is tried all the same.
+        let least = pairs.iter().map(|(image, keys)| image.with(keys, budget).0).min().unwrap_or(0);
+        for (image, keys) in pairs {
+            let (predicted, source) = image.with(keys, budget);
+            if fitting == TRIES || (predicted as f64 > budget as f64 * SLACK && predicted > least) {
+                continue;
+            }
+            self.say(steps - STEPS - TRIES + fitting, steps);
+            let flat = match current.take() {
+                Some((fine, flat)) if fine == fineness(&image.source) => flat,
+                _ => self.flat(image.source)?,
+            };
+            let error = self.prunes(keys.error);
+            let settings = Settings { atlas: source, sparing: Sparing::Within(budget), error, ..keys.settings };
+            let found = score(&flat, &settings, true)?;
+            current = Some((fineness(&image.source), flat));
+            let Some(found) = found else { continue };
+            fitting += usize::from(found > 0.0);
+            if best.is_none_or(|(_, most)| found > most) {
+                best = Some((settings, found));
+            }
+        }
+        let Some(start) = best else {
+            return Err(exceeded.unwrap_or(BakeError::Budget { budget, smallest: u64::MAX }));
+        };
+        let flat = match current {
+            Some((fine, flat)) if fine == fineness(&start.0.atlas) => flat,
+            _ => self.flat(start.0.atlas)?,
+        };
+        // Coarser coding is what makes a bundle fit.
+        let free = Free { lambda: false, ..self.free() };
+        let mut step = steps - STEPS;
+        let (settings, found) = climb(start, &free, (Take::First, &Step::ALL), STEPS, |settings| {
+            self.say(step, steps);
+            step += 1;
+            score(&flat, settings, false)
+        })?;
+        if found < 0.0 {
+            let (_, bytes, memory) = nearest;
+            return Err(match limits.memory {
+                Some(room) => BakeError::Both { budget, room, bytes, memory, held: self.options.held() },
+                None => BakeError::Budget { budget, smallest: bytes },
+            });
+        }
+        self.finish(flat, settings, Vec::new())
+    }
+}
+
+/// What the user should know where the source image is packed for the sake of `budget`, and takes so many bytes of memory.
+pub(crate) fn packed(budget: u64, memory: usize) -> String {
+    format!(
+        "--budget {budget}: the source image is packed to fit, and takes {} bytes of memory unpacked; --storage raw keeps it in flash, at lower quality",
+        grouped(memory)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::job::bake_scene;
+    use crate::options::{Goal, Options, TruthFrames};
+    use crate::scene::{Scene, builtin};
+
+    fn small(name: &str) -> Scene {
+        let mut scene = builtin::build(name).unwrap();
+        (scene.playback.width, scene.playback.height, scene.playback.frames) = (48, 36, 9);
+        scene
+    }
+
+    #[test]
+    fn a_budget_is_kept_and_more_of_it_is_no_worse() {
+        let scene = small("cone-orbit");
+        let bake = |budget| {
+            let options = Options { goal: Some(Goal::Budget(budget)), truth: TruthFrames::All, ..Options::default() };
+            bake_scene(&scene, &options, &|_, _| {})
+        };
+        let (bytes, small) = bake(6_000).unwrap();
+        assert!(bytes.len() <= 6_000, "{}", bytes.len());
+        let (bytes, large) = bake(12_000).unwrap();
+        assert!(bytes.len() <= 12_000, "{}", bytes.len());
+        let psnr = |report: &crate::Report| report.quality_vs_truth.unwrap().psnr_mean;
+        assert!(psnr(&large) >= psnr(&small) - 0.2, "{} {}", psnr(&large), psnr(&small));
+        let Err(BakeError::Budget { budget: 500, smallest }) = bake(500) else { panic!("500 bytes cannot hold a scene") };
+        assert!((500..6_000).contains(&smallest), "{smallest}");
+    }
+
+    #[test]
+    fn a_picture_is_packed_where_it_does_not_fit_raw() {
+        let scene = small("street");
+        let bake = |goal, storage| {
+            let options = Options { goal, storage, cell: Some(8), truth: TruthFrames::All, ..Options::default() };
+            bake_scene(&scene, &options, &|_, _| {}).unwrap()
+        };
+        let (plain, usual) = bake(None, None);
+        let tight = Some(Goal::Budget(plain.len() as u64 * 45 / 100));
+        let told = |report: &crate::Report| report.warnings.iter().any(|warning| warning.contains("--storage raw"));
+        let (bytes, open) = bake(tight, None);
+        assert!(
+            bytes.len() <= plain.len() * 45 / 100 && open.source_image.storage == Storage::Packed && told(&open),
+            "{:?}",
+            open.warnings
+        );
+        let takes = format!("takes {} bytes of memory", grouped(open.memory.picture));
+        assert!(open.warnings.iter().any(|warning| warning.contains(&takes)), "{:?}", open.warnings);
+        assert!(open.memory.picture == open.source_image.raw_bytes && open.source_image.stored_bytes < open.source_image.raw_bytes);
+        let (_, raw) = bake(tight, Some(Storage::Raw));
+        assert!(raw.source_image.storage == Storage::Raw && raw.memory.picture == 0 && !told(&raw));
+        let psnr = |report: &crate::Report| report.quality_vs_truth.unwrap().psnr_mean;
+        assert!(psnr(&open) > psnr(&raw), "{} {}", psnr(&open), psnr(&raw));
+        // Where there is room, flash is where the picture stays, and nothing is worse than it would be without a budget.
+        let (_, wide) = bake(Some(Goal::Budget(plain.len() as u64 * 4)), None);
+        assert!(wide.source_image.storage == Storage::Raw && !told(&wide));
+        assert!(psnr(&wide) >= psnr(&usual), "{} {}", psnr(&wide), psnr(&usual));
+    }
+
+    #[test]
+    fn a_budget_is_kept_in_the_memory_there_is() {
+        let scene = small("cone-orbit");
+        let bake = |goal, room| {
+            let options = Options { goal: Some(goal), room, key_interval: Some(4), truth: TruthFrames::All, ..Options::default() };
+            bake_scene(&scene, &options, &|_, _| {})
+        };
+        let (_, wide) = bake(Goal::Budget(12_000), None).unwrap();
+        let room = wide.memory.workspace * 6 / 10;
+        let (bytes, tight) = bake(Goal::Budget(12_000), Some(room)).unwrap();
+        assert!(bytes.len() <= 12_000 && tight.memory.workspace <= room, "{} {} {room}", bytes.len(), tight.memory.workspace);
+        // More of it is no worse: what is baked without a word on memory needs no more than this.
+        let (bytes, same) = bake(Goal::Budget(12_000), Some(wide.memory.workspace)).unwrap();
+        assert!(bytes.len() <= 12_000 && same.memory.workspace <= wide.memory.workspace);
+        let psnr = |report: &crate::Report| report.quality_vs_truth.unwrap().psnr_mean;
+        assert!(psnr(&tight) > 20.0 && psnr(&same) >= psnr(&tight) - 0.2, "{} {}", psnr(&tight), psnr(&same));
+        let Err(error @ BakeError::Both { memory, .. }) = bake(Goal::Budget(12_000), Some(500)) else { panic!("contexts alone take more") };
+        assert!(memory > 500 && error.to_string().contains(&memory.to_string()), "{error}");
+        // A quality likewise.
+        let asked = same.quality.psnr_mean.min(tight.quality.psnr_mean) - 2.0;
+        let (_, good) = bake(Goal::Psnr(asked), Some(room)).unwrap();
+        assert!(good.quality.psnr_mean >= asked && good.memory.workspace <= room, "{} {}", good.quality.psnr_mean, good.memory.workspace);
+        assert!(matches!(bake(Goal::Psnr(asked), Some(500)), Err(BakeError::Ram { asked: 500, smallest, .. }) if smallest > 500));
+        let Err(error @ BakeError::Psnr { .. }) = bake(Goal::Psnr(90.0), Some(room)) else { panic!("90 dB are out of reach") };
+        assert!(error.to_string().ends_with("or raise --ram"), "{error}");
+    }
+}
