@@ -38,6 +38,7 @@ pub mod patch;
 pub mod planes;
 pub mod polish;
 mod prune;
+mod quality;
 pub mod ram;
 pub mod repaint;
 pub mod report;

@@ -1,18 +1,15 @@
-//! Tuning: searches for a goal. What they have in common, and the smallest bundle that reaches a quality; `budget` has that of bytes, `ram` that of memory.
+//! Tuning: searches for a goal. What they have in common; `budget`, `quality` and `ram` have the three of them.
 //! A scene and a goal come from `job`; the winner goes back there. Rays are cast once; whatever is tried is baked, played
 //! and measured. What is tried, and in which order, depends on nothing but the scene and the options.
 
 use crate::atlas::{self, Storage};
 use crate::bake::{self, BakeError, Encoded, Flat, Progress, Settings};
 use crate::cast::Cast;
-use crate::climb::{Free, Step, Take, climb};
-use crate::metrics;
+use crate::climb::Free;
 use crate::options::{Goal, Options};
 use crate::repaint::Painter;
 use crate::scene::Scene;
-use crate::verify;
 use cubist_core::format::{SPACE_LINEAR, TIME_LINEAR};
-use std::cell::Cell;
 use std::time::Instant;
 
 /// Cells tried at first, pixels,
@@ -28,8 +25,6 @@ const SHORT: (u32, [u32; 2]) = (32, [2, 1]);
 pub(crate) const DENSITIES: [f64; 9] = [1.0, 0.85, 0.7, 0.6, 0.5, 0.35, 0.25, 0.18, 0.125];
 /// Steps tried from the best of what was tried at first.
 pub(crate) const STEPS: usize = 18;
-/// The score of a bundle of no bytes that reaches the quality asked for; no quality in dB is half as high, nor is a bundle half as large.
-const REACHED: f64 = 1e12;
 /// Bytes of working memory that a player may need without having been told: half of an RP2040's. More only where the first tries take it too.
 pub(crate) const MOST_MEMORY: usize = 128 << 10;
 
@@ -84,7 +79,7 @@ pub(crate) struct Search<'a> {
     pub(crate) scene: &'a Scene,
     pub(crate) options: &'a Options,
     pub(crate) cast: &'a Cast<'a>,
-    painter: Option<&'a Painter>,
+    pub(crate) painter: Option<&'a Painter>,
     progress: Progress<'a>,
 }
 
@@ -155,87 +150,6 @@ impl Search<'_> {
             frames: self.scene.playback.frames,
         }
     }
-
-    /// The smallest bundle whose mean PSNR against exact rays reaches `asked`.
-    fn psnr(&self, asked: f64) -> Result<Chosen, BakeError> {
-        let mut source = self.options.source();
-        let ratios: Vec<f64> = DENSITIES.into_iter().filter(|&ratio| ratio == 1.0 || ratio < 0.8).collect();
-        let steps = Cell::new(self.grids(source).len() + STEPS);
-        let (mut step, mut nearest, mut room, mut exceeded) = (0, 0.0f64, MOST_MEMORY, None);
-        let (limits, mut smallest) = (self.options.limits(), usize::MAX);
-        // Of bundles that reach it the smaller one counts, of those that do not the better one.
-        let mut score = |flat: &Flat, settings: &Settings, first: bool| -> Result<Option<f64>, BakeError> {
-            self.say(step, steps.get());
-            step += 1;
-            let Some(Encoded { bundle, .. }) = possible(self.encode(flat, settings), &mut exceeded)? else { return Ok(None) };
-            let memory = verify::memory(&bundle)?;
-            smallest = smallest.min(memory);
-            // Of those that take more than there is the smaller one counts.
-            let over = limits.over(0, memory);
-            if over > 0 {
-                return Ok(Some(-(over as f64)));
-            }
-            let painted = self.painter.map_or(Ok(None), |painter| painter.painted(&bundle, &flat.atlas.image, &settings.atlas))?;
-            let (bundle, image) = painted.map_or((bundle, None), |(bundle, image)| (bundle, Some(image)));
-            let psnr = verify::briefly(&bundle, image.as_ref().unwrap_or(&flat.atlas.image), &flat.atlas.gbuffer)?.psnr_mean;
-            let reached = psnr >= asked;
-            // Memory is no matter until there is one that reaches it.
-            if first || limits.memory.is_some() || (reached && nearest < asked) {
-                room = room.max(memory);
-            }
-            nearest = nearest.max(psnr);
-            Ok(match reached {
-                true if memory <= room => Some(REACHED - bundle.len() as f64),
-                true => None,
-                false => Some(psnr),
-            })
-        };
-        let free = self.free();
-        let mut best: Option<(Settings, f64)> = None;
-        for (turn, &ratio) in ratios.iter().enumerate() {
-            if turn == 1 {
-                // A coarser picture is rarely asked for: only then there is one more try for each, and steps from the one that does.
-                steps.set(steps.get() + ratios.len() - 1 + STEPS);
-            }
-            let wanted = atlas::Settings { density: source.density * ratio, ..source };
-            let flat = self.flat(wanted)?;
-            if turn == 0 {
-                source.density *= flat.atlas.figures.scale.min(1.0);
-                for settings in self.grids(wanted) {
-                    let settings = Settings { error: self.prunes(metrics::mse(asked)), ..settings };
-                    if let Some(found) = score(&flat, &settings, true)?
-                        && best.is_none_or(|(_, most)| found > most)
-                    {
-                        best = Some((settings, found));
-                    }
-                }
-            } else if let Some((settings, found)) = &mut best {
-                // With fewer texels a pixel, what came closest.
-                settings.atlas = wanted;
-                *found = score(&flat, settings, false)?.unwrap_or(0.0);
-            }
-            let Some(start) = best else { break };
-            let most = if turn == 0 || start.1 > REACHED / 2.0 { STEPS } else { 0 };
-            let (settings, found) = climb(start, &free, (Take::First, &Step::ALL), most, |settings| score(&flat, settings, false))?;
-            best = Some((settings, found));
-            if found > REACHED / 2.0 {
-                let coarser = (turn > 0).then(|| {
-                    format!(
-                        "--psnr {asked}: out of reach at a density of {:.2} texels a pixel: the source image has {:.2}, which shows less detail",
-                        source.density, wanted.density
-                    )
-                });
-                return self.finish(flat, settings, coarser.into_iter().collect());
-            }
-        }
-        // Not a single bundle: what was in the way is the answer.
-        let held = self.options.held();
-        Err(match (exceeded.filter(|_| best.is_none()), limits.memory) {
-            (Some(exceeded), _) => exceeded,
-            (None, Some(asked)) if smallest > asked => BakeError::Ram { asked, smallest, held },
-            _ => BakeError::Psnr { asked, nearest, held },
-        })
-    }
 }
 
 /// What came of an attempt; `None` where a bundle cannot hold it: that ends the attempt, not the search. The first to exceed
@@ -247,45 +161,5 @@ pub(crate) fn possible<T>(attempt: Result<T, BakeError>, exceeded: &mut Option<B
             Ok(None)
         }
         other => other.map(Some),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::job::bake_scene;
-    use crate::options::TruthFrames;
-    use crate::scene::builtin;
-
-    fn small(name: &str) -> Scene {
-        let mut scene = builtin::build(name).unwrap();
-        (scene.playback.width, scene.playback.height, scene.playback.frames) = (48, 36, 9);
-        scene
-    }
-
-    #[test]
-    fn a_quality_is_reached_or_the_nearest_is_named() {
-        let scene = small("cone-orbit");
-        let bake = |asked| {
-            let options = Options { goal: Some(Goal::Psnr(asked)), truth: TruthFrames::None, ..Options::default() };
-            bake_scene(&scene, &options, &|_, _| {})
-        };
-        let (plain, report) = bake_scene(&scene, &Options::default(), &|_, _| {}).unwrap();
-        let reached = report.quality.psnr_mean;
-        // At the worst it is what is baked without a goal.
-        for asked in [reached, reached - 1.0] {
-            let (bytes, report) = bake(asked).unwrap();
-            let psnr = report.quality.psnr_mean;
-            let told = (plain.len(), bytes.len(), &report.grid);
-            assert!(psnr >= asked && bytes.len() <= plain.len(), "{asked} {psnr} dB, {told:?}");
-        }
-        let Err(error @ BakeError::Psnr { nearest, .. }) = bake(98.0) else { panic!("98 dB are out of reach") };
-        assert!(nearest > reached && error.to_string().contains(&format!("{nearest:.2}")), "{error}");
-        // What was not given is not to blame.
-        assert!(!error.to_string().contains("--cell"), "{error}");
-        let options =
-            Options { goal: Some(Goal::Psnr(98.0)), cell: Some(16), key_interval: Some(4), truth: TruthFrames::None, ..Options::default() };
-        let error = bake_scene(&scene, &options, &|_, _| {}).err().unwrap();
-        assert!(error.to_string().ends_with("ask for less, or leave --cell and --key-interval to the search"), "{error}");
     }
 }
