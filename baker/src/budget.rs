@@ -195,13 +195,12 @@ impl Search<'_> {
             room = if first || limits.memory.is_some() { room.max(memory) } else { room };
             Ok(if memory <= room { Some(samples.of_bundle(&bundle)?.1) } else { None })
         };
-        let mut pairs = pairs.to_vec();
-        let plays = |(image, keys): &(&Image, &Keys)| limits.memory.is_none_or(|room| image.memory(keys, budget) <= room);
-        if pairs.iter().any(plays) {
-            pairs.retain(plays);
-        }
+        // Of those that are predicted to take more memory than there is, the least are tried if there are no others.
+        let memory = |(image, keys): &(&Image, &Keys)| image.memory(keys, budget);
+        let most = limits.memory.map(|most| pairs.iter().map(memory).min().unwrap_or(0).max(most));
+        let pairs = pairs.iter().filter(|pair| most.is_none_or(|most| memory(pair) <= most));
         // Where nothing is predicted to fit, the smallest prediction is tried all the same.
-        let least = pairs.iter().map(|(image, keys)| image.with(keys, budget).0).min().unwrap_or(0);
+        let least = pairs.clone().map(|(image, keys)| image.with(keys, budget).0).min().unwrap_or(0);
         for (image, keys) in pairs {
             let (predicted, source) = image.with(keys, budget);
             if fitting == TRIES || (predicted as f64 > budget as f64 * SLACK && predicted > least) {
