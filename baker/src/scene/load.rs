@@ -6,6 +6,7 @@ use super::model::{Model, bounding_sphere};
 use super::{Background, Light, Playback, Scene, SceneError, Up, builtin, file, gltf, obj, ply, stl};
 use crate::camera::Orbit;
 use glam::{DVec3, Vec3};
+use std::io::Read;
 use std::path::Path;
 use std::sync::Arc;
 
@@ -113,28 +114,37 @@ pub fn load_builtin(name: &str, overrides: &Overrides) -> Result<Scene, SceneErr
 /// file, and what to do.
 type Loader = fn(Vec<u8>, &Path, Option<&Path>) -> Result<Model, String>;
 
-/// Loads a model by its ending; `None` if it is no model's. `texture` is for a model whose file names none; `up` is Z in STL files unless given, else Y.
+/// Loads a model by its ending; `None`, unread, if it is no model's. `texture` is for a model whose file names none; `up` is Z in STL files unless given,
+/// else Y.
 pub(crate) fn model(path: &Path, texture: Option<&Path>, up: Option<Up>) -> Option<Result<Model, SceneError>> {
     let ending = path.extension()?.to_string_lossy().to_ascii_lowercase();
-    let loader: Option<Loader> = match ending.as_str() {
-        "glb" | "gltf" => Some(gltf::load),
-        "obj" => Some(obj::load),
-        "ply" => Some(ply::load),
-        "stl" => Some(stl::load),
-        _ => None,
-    };
     let at_fault = |what| SceneError::Model { file: path.to_owned(), what };
+    let loader: Loader = match ending.as_str() {
+        "glb" | "gltf" => gltf::load,
+        "obj" => obj::load,
+        "ply" => ply::load,
+        "stl" => stl::load,
+        _ => return misnamed(&head(path)?, &ending).map(|what| Err(at_fault(what))),
+    };
     let bytes = match crate::files::read(path) {
         Ok(bytes) => bytes,
-        Err(what) => return loader.map(|_| Err(SceneError::Read { file: path.to_owned(), what })),
+        Err(what) => return Some(Err(SceneError::Read { file: path.to_owned(), what })),
     };
     if let Some(what) = misnamed(&bytes, &ending) {
         return Some(Err(at_fault(what)));
     }
     let folder = path.parent().unwrap_or(Path::new(""));
     let up = up.unwrap_or(if ending == "stl" { Up::Z } else { Up::Y });
-    let loaded = loader?(bytes, folder, texture).and_then(Model::finish);
+    let loaded = loader(bytes, folder, texture).and_then(Model::finish);
     Some(loaded.map(|model| model.stand(up)).map_err(at_fault))
+}
+
+/// The first bytes of a file, if it has as many: they tell binary glTF and PLY from all else.
+fn head(path: &Path) -> Option<[u8; 4]> {
+    let (mut file, _) = crate::files::open_to_read(path).ok()?;
+    let mut bytes = [0; 4];
+    file.read_exact(&mut bytes).ok()?;
+    Some(bytes)
 }
 
 /// What is wrong with a model's name, if its first bytes are another format's.
