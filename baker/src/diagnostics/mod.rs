@@ -5,7 +5,7 @@ mod maps;
 mod rays;
 mod texels;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use cubist_baker::atlas::SourceImage;
 use cubist_baker::files::write_png;
 use cubist_baker::job::Baked;
@@ -13,6 +13,8 @@ use cubist_baker::truth::spread;
 use cubist_baker::verify;
 use std::path::Path;
 
+/// What is shown of a frame: what the names of its pictures end in.
+const KINDS: [&str; 4] = ["exact", "played", "compare", "rays"];
 /// Frames shown exact and played.
 const FRAMES: u32 = 3;
 /// How much stronger than it is a difference is shown.
@@ -52,7 +54,8 @@ impl Picture {
 }
 
 /// Writes into `folder`: source-image.png, mask.png, never-seen.png and density.png; for three frames and the worst one frame-NNNN-exact.png,
-/// frame-NNNN-played.png, frame-NNNN-compare.png (exact, played, their difference four times as strong) and frame-NNNN-rays.png.
+/// frame-NNNN-played.png, frame-NNNN-compare.png (exact, played, their difference four times as strong) and frame-NNNN-rays.png. Pictures of other frames,
+/// which an earlier bake left there, are removed.
 pub fn write(folder: &Path, baked: &Baked) -> Result<()> {
     let (flat, report) = (&baked.flat, &baked.report);
     let image = &flat.atlas.image;
@@ -70,20 +73,45 @@ pub fn write(folder: &Path, baked: &Baked) -> Result<()> {
     frames.sort_unstable();
     frames.dedup();
     verify::play(&baked.bundle, &frames, |frame, played| {
-        let name = |kind: &str| folder.join(format!("frame-{frame:04}-{kind}.png"));
+        let [exact_name, played_name, compare_name, rays_name] = KINDS.map(|kind| folder.join(name(frame, kind)));
         let write = || {
             let exact = verify::exact_frame(&flat.atlas, frame);
-            write_png(&name("exact"), gbuffer.width, &exact)?;
-            write_png(&name("played"), gbuffer.width, played)?;
+            write_png(&exact_name, gbuffer.width, &exact)?;
+            write_png(&played_name, gbuffer.width, played)?;
             let difference: Vec<u8> = exact.iter().zip(played).map(|(a, b)| a.abs_diff(*b).saturating_mul(GAIN)).collect();
-            write_png(&name("compare"), gbuffer.width * 3, &side_by_side(gbuffer.width, [&exact, played, &difference]))?;
-            rays::draw(flat, frame, report.grid.cell).write(&name("rays"))
+            write_png(&compare_name, gbuffer.width * 3, &side_by_side(gbuffer.width, [&exact, played, &difference]))?;
+            rays::draw(flat, frame, report.grid.cell).write(&rays_name)
         };
         if result.is_ok() {
             result = write();
         }
     })?;
-    result
+    result.and_then(|()| remove_others(folder, &frames))
+}
+
+/// What the picture of that `kind` of a frame is called.
+fn name(frame: u32, kind: &str) -> String {
+    format!("frame-{frame:04}-{kind}.png")
+}
+
+/// The frame whose picture has this name.
+fn frame_of(file: &str) -> Option<u32> {
+    let (frame, _) = file.strip_prefix("frame-")?.split_once('-')?;
+    let frame = frame.parse().ok()?;
+    // Numbers are written in other ways, too, but not by us.
+    KINDS.iter().any(|kind| name(frame, kind) == file).then_some(frame)
+}
+
+/// Removes the pictures of other frames than `frames` from `folder`.
+fn remove_others(folder: &Path, frames: &[u32]) -> Result<()> {
+    for entry in std::fs::read_dir(folder).with_context(|| format!("{}: the folder cannot be read", folder.display()))?.flatten() {
+        let other = entry.file_name().to_str().and_then(frame_of).is_some_and(|frame| !frames.contains(&frame));
+        if other && entry.file_type().is_ok_and(|kind| kind.is_file()) {
+            let path = entry.path();
+            std::fs::remove_file(&path).with_context(|| format!("{}: the picture of an earlier bake cannot be removed", path.display()))?;
+        }
+    }
+    Ok(())
 }
 
 /// The source image; texels without a surface at half brightness, the labels' rectangles and the charts' outlines drawn over it.
@@ -130,7 +158,10 @@ mod tests {
         (scene.playback.width, scene.playback.height, scene.playback.frames) = (64, 48, 5);
         let baked = job::run(&scene, &Options { truth: TruthFrames::None, ..Options::default() }, &|_, _| {}).expect("a bundle");
         let folder = tempfile::tempdir().expect("a folder");
+        let earlier = folder.path().join(name(5, "exact"));
+        std::fs::write(&earlier, "earlier").expect("a file");
         write(folder.path(), &baked).expect("pictures");
+        assert!(!earlier.exists(), "there are five frames");
         let image = &baked.flat.atlas.image;
         let tall = image.height * SIDE / image.width;
         let mut sizes = vec![
@@ -157,5 +188,30 @@ mod tests {
         let shown = open("never-seen").pixels().filter(|pixel| pixel.0 == maps::NEVER).count();
         let square = (SIDE / image.width).pow(2) as usize;
         assert!(never > 0 && shown == never * square, "{never} texels are never seen, {shown} pixels of {square} a texel say so");
+    }
+
+    #[test]
+    fn pictures_of_other_frames_are_removed_and_nothing_else() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let files = [
+            ("frame-0001-exact.png", false),
+            ("frame-0002-compare.png", true),
+            ("frame-12345-rays.png", false),
+            ("frame-7-exact.png", true),
+            ("frame-+007-exact.png", true),
+            ("frame-00007-exact.png", true),
+            ("frame-0007-mine.png", true),
+            ("frame-0007.png", true),
+            ("frame-0007-exact.png.bak", true),
+            ("frame-99999999999-exact.png", true),
+        ];
+        for (name, _) in files {
+            std::fs::write(folder.path().join(name), "earlier").expect(name);
+        }
+        std::fs::create_dir(folder.path().join("frame-0008-exact.png")).expect("a folder");
+        remove_others(folder.path(), &[0, 2, 4]).expect("removed");
+        for (name, kept) in files.into_iter().chain([("frame-0008-exact.png", true)]) {
+            assert_eq!(folder.path().join(name).exists(), kept, "{name}");
+        }
     }
 }
