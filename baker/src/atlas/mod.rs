@@ -20,6 +20,7 @@ use crate::gbuffer::{BACKGROUND, GBuffer, Hits};
 use crate::scene::{Background, Scene};
 use crate::shade::Shader;
 use cubist_core::format::{MOST_FINER, TexelKind};
+use fill::Seen;
 pub use outline::{Outline, Tiled};
 pub use palette::widened;
 use rayon::prelude::*;
@@ -331,14 +332,6 @@ fn fixed(scene: &Scene, rect: &[u32; 4]) -> Fixed {
             step: [(x1 - x0) / scene.playback.width.max(1) as f32, (y1 - y0) / scene.playback.height.max(1) as f32],
         },
     }
-}
-
-/// Which samples fall into each texel.
-pub(crate) struct Seen {
-    /// How many.
-    pub count: Vec<u32>,
-    /// The first of them; `u32::MAX` if there is none.
-    pub first: Vec<u32>,
 }
 
 /// The G-buffer, and what of it falls into each texel.

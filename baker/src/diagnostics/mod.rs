@@ -2,6 +2,7 @@
 //! A finished job comes in; PNG files go out.
 
 mod maps;
+mod picture;
 mod rays;
 mod texels;
 
@@ -21,38 +22,6 @@ const FRAMES: u32 = 3;
 const GAIN: u8 = 4;
 /// The colour of the charts' borders.
 const BORDER: [u8; 3] = [255, 0, 255];
-/// Width of enlarged pictures of the source image, pixels: a whole number for a texel.
-const SIDE: u32 = 1024;
-
-/// A picture [`SIDE`] pixels wide.
-struct Picture {
-    pixels: Vec<[u8; 3]>,
-}
-
-impl Picture {
-    /// Texels of a source image of `width` texels a row, each as a square.
-    fn enlarged(texels: &[[u8; 3]], width: u32) -> Self {
-        let scale = (SIDE / width) as usize;
-        let row = |row: &[[u8; 3]]| -> Vec<[u8; 3]> { row.iter().flat_map(|&texel| std::iter::repeat_n(texel, scale)).collect() };
-        Self { pixels: texels.chunks(width as usize).flat_map(|texels| row(texels).repeat(scale)).collect() }
-    }
-
-    fn height(&self) -> u32 {
-        self.pixels.len() as u32 / SIDE
-    }
-
-    /// Fills a rectangle: left, top, right, bottom.
-    fn fill(&mut self, [left, top, right, bottom]: [u32; 4], colour: [u8; 3]) {
-        for y in top..bottom {
-            self.pixels[(y * SIDE + left) as usize..(y * SIDE + right) as usize].fill(colour);
-        }
-    }
-
-    fn write(&self, path: &Path) -> Result<()> {
-        write_png(path, SIDE, self.pixels.as_flattened())
-    }
-}
-
 /// Writes into `folder`: source-image.png, mask.png, never-seen.png and density.png; for three frames and the worst one frame-NNNN-exact.png,
 /// frame-NNNN-played.png, frame-NNNN-compare.png (exact, played, their difference four times as strong) and frame-NNNN-rays.png. Pictures of other frames,
 /// which an earlier bake left there, are removed.
@@ -148,6 +117,7 @@ fn side_by_side(width: u32, pictures: [&[u8]; 3]) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
+    use super::picture::SIDE;
     use super::*;
     use cubist_baker::scene::builtin;
     use cubist_baker::{Options, TruthFrames, job};

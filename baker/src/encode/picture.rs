@@ -2,7 +2,6 @@
 //! The core describes the stream (`cubist_core::pack`); `encode` puts the bytes into bundles, `inspect` and the search ask for them.
 
 use super::range::Encoder;
-use super::rgb565;
 use crate::atlas::{SourceImage, Storage, Tiled};
 use cubist_core::Bundle;
 use cubist_core::coder::{Bits, Decoder, Probability};
@@ -106,6 +105,12 @@ pub fn image_bytes(image: &SourceImage, storage: Storage) -> usize {
     };
     let entries = image.palette.len().min(image.kind.colours());
     stored + 2 * entries + LABEL_BYTES * image.labels.len()
+}
+
+/// A colour in the display's 5, 6 and 5 bits.
+#[must_use]
+pub fn rgb565([r, g, b]: [u8; 3]) -> u16 {
+    u16::from(r >> 3) << 11 | u16::from(g >> 2) << 5 | u16::from(b >> 3)
 }
 
 #[cfg(test)]

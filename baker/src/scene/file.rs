@@ -1,12 +1,15 @@
 //! Scene files: their values judged, what they name loaded, all put together.
 //! The text comes from a .toml file; the `Scene` goes to the baker.
 
+use super::alone::{self, BACKGROUND, FOV};
+use super::endings::MODELS_TOLD;
 use super::error::{SceneError, Warnings};
 use super::keys::{CameraTable, File, HeightTable, LightTable, Source};
-use super::load::{self, BACKGROUND, FOV, MAX_FPS, MAX_FRAMES, MAX_SCREEN, MODELS_TOLD, Overrides, PLAYBACK};
+use super::loader;
 use super::model::Model;
+use super::overrides::{MAX_FPS, MAX_FRAMES, MAX_SCREEN, Overrides, PLAYBACK};
 use super::up::Along;
-use super::{Background, Light, Playback, Scene, Triangle, Wrap, heightfield, picture};
+use super::{Background, Light, Playback, Scene, Triangle, Wrap, builtin, heightfield, picture};
 use crate::camera::{self, Aim, Line, Orbit, Pivot, Spline};
 use glam::{DVec3, Vec3};
 use std::path::{Path, PathBuf};
@@ -24,7 +27,7 @@ pub(crate) fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneErr
     }
     let lights = lights(&source, &file.light)?;
     if let Some(name) = &file.scene.builtin {
-        return builtin(&source, &file, name, lights, overrides);
+        return built_in(&source, &file, name, lights, overrides);
     }
     let playback = overrides.apply(playback(&source, &file, PLAYBACK)?)?;
     let mut model = model(&source, &file, &playback, lights.is_empty(), overrides)?;
@@ -33,10 +36,10 @@ pub(crate) fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneErr
             Some(path) => path,
             None => {
                 let fov = table.fov.unwrap_or(FOV);
-                Arc::new(load::turntable(&model, &playback, fov, table.up.map_or(DVec3::Y, DVec3::from_array)))
+                Arc::new(alone::turntable(&model, &playback, fov, table.up.map_or(DVec3::Y, DVec3::from_array)))
             }
         },
-        None => Arc::new(load::turntable(&model, &playback, FOV, DVec3::Y)),
+        None => Arc::new(alone::turntable(&model, &playback, FOV, DVec3::Y)),
     };
     if file.camera.as_ref().is_some_and(|c| c.gltf.is_some() && c.up.is_some()) {
         model.warnings.add("camera.up is ignored: the model's camera has its own");
@@ -53,7 +56,7 @@ pub(crate) fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneErr
     }
     let background = background(&source, &file, &mut model.warnings)?.unwrap_or(Background::Colour(BACKGROUND));
     Ok(Scene {
-        name: load::name(path),
+        name: alone::name(path),
         triangles: model.triangles,
         materials: model.materials,
         textures: model.textures.into(),
@@ -65,7 +68,7 @@ pub(crate) fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneErr
     })
 }
 
-fn builtin(source: &Source<'_>, file: &File, name: &str, lights: Vec<Light>, overrides: &Overrides) -> Result<Scene, SceneError> {
+fn built_in(source: &Source<'_>, file: &File, name: &str, lights: Vec<Light>, overrides: &Overrides) -> Result<Scene, SceneError> {
     for (other, given) in [
         ("model", file.scene.model.is_some()),
         ("heightfield", file.scene.heightfield.is_some()),
@@ -77,8 +80,8 @@ fn builtin(source: &Source<'_>, file: &File, name: &str, lights: Vec<Light>, ove
         }
     }
     overrides.no_model("a built-in scene")?;
-    let mut scene = load::load_builtin(name, &Overrides::default()).map_err(|e| source.error("scene.builtin", e.to_string()))?;
-    scene.name = load::name(source.file);
+    let mut scene = builtin::load_builtin(name, &Overrides::default()).map_err(|e| source.error("scene.builtin", e.to_string()))?;
+    scene.name = alone::name(source.file);
     scene.playback = overrides.apply(playback(source, file, scene.playback)?)?;
     if let Some(table) = &file.camera {
         let own = scene.camera.pose(0.0).fov;
@@ -142,7 +145,7 @@ fn model(source: &Source<'_>, file: &File, playback: &Playback, unlit: bool, ove
                 check_file(source, "scene.texture", texture)?;
             }
             let up = file.scene.up.as_ref().map(|up| up.parse().map_err(|what| source.error("scene.up", what))).transpose()?;
-            load::model(&full, texture.as_deref(), overrides.up.or(up)).unwrap_or_else(|| {
+            loader::model(&full, texture.as_deref(), overrides.up.or(up)).unwrap_or_else(|| {
                 Err(source.error("scene.model", format!("found \"{}\"; expected a {MODELS_TOLD} file: convert the model", path.display())))
             })
         }
