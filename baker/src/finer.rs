@@ -1,7 +1,25 @@
-//! Cells and keys of another shape: where so many outlines cross a cell that sheets are given up in a good part of the picture, cells half as large
-//! with keys twice as far apart may show more for the bytes, or keys twice as far apart as much for fewer; where positions hardly bend on their way
-//! from key to key, the latter alone, or else closer ones; where outlines are few but positions bend, keys twice as close show more, and on rough land
-//! cells twice as large besides, in less memory. A bundle baked as usual comes from `job`; the best of a few goes back.
+//! Other cells and key intervals than the usual ones, where trials show that they are worth it. A bundle baked as usual comes from `job`; the best of a few
+//! goes back, and why.
+//!
+//! Two figures of the usual bundle tell what to try. Its wrong pixels: from [`TORN`] on, outlines are *many*, so many cross a cell that sheets are given up.
+//! And by how much positions are off on their way from key to key: below [`STEADY`] they are *steady*, from [`BENT`] on they *bend*. `climbs` has the whole
+//! list; its main rows are:
+//!
+//! | outlines | positions | tried | because |
+//! |---|---|---|---|
+//! | many | steady, or cells are large | cells half as large with keys twice as far apart | shows more for the bytes |
+//! | | | else keys twice as far apart | shows as much for fewer bytes |
+//! | many | in between | keys twice as far apart | the same |
+//! | many | bend | nothing | |
+//! | few | steady | keys twice as far apart, and again | the same |
+//! | | | else closer ones | outlines may turn though surfaces go straight on |
+//! | few | in between | closer keys | the same |
+//! | few | bend | keys twice as close | shows more |
+//! | | | with cells twice as large besides | rough land: shows more, in less memory |
+//!
+//! Two kinds of paths have closer keys tried besides, down to one a frame, whatever crosses cells. Brief ones, of up to [`BRIEF`] frames, mostly go fast, and
+//! a trial of them takes little time: all that is tried counts there, not only what comes before the first gain. On longer ones something may pass close by
+//! the camera between two keys (see `passing`): closer keys then come first.
 
 use crate::bake::{BakeError, Flat, Progress, Settings};
 use crate::climb::{Free, Step, Take, climb};

@@ -1,5 +1,5 @@
 //! PLY, ASCII or binary of either byte order, with vertex colours, through `ply-rs-bw`.
-//! Files come from `load`; models go back there.
+//! Files come from `loader`; models go back there.
 
 use super::model::{MAX_TRIANGLES, Model, too_many};
 use super::{Material, Triangle, Wrap, picture, polygon};
