@@ -164,6 +164,47 @@ fn gain<E>(keys: Ordering, exact: f64, time: [f64; 2], visible: impl FnOnce() ->
     }
 }
 
+/// What bundles are worth beside the usual one.
+struct Gains<'a> {
+    usual: &'a Made,
+    /// Its quality before sheets were left out.
+    all: &'a Brief,
+    /// What they are made from, and hold the scene against.
+    flat: &'a Flat,
+    seen: &'a Seen<'a>,
+    /// Bytes of the source image.
+    picture: usize,
+    /// What the usual one is worth beside exact rays,
+    exact: f64,
+    /// and by what is seen of it: told where it is asked for, as the scene has to be rendered for it.
+    visible: Option<f64>,
+}
+
+impl Gains<'_> {
+    /// By how much `made` is worth more.
+    fn of(&mut self, made: &Made) -> Result<f64, BakeError> {
+        let &mut Self { usual, all, flat, seen, picture, .. } = self;
+        let [before, after] = [usual, made].map(|made| made.quality.wrong_surface_percent);
+        let keys = made.settings.key_interval.cmp(&usual.settings.key_interval);
+        if keys == Ordering::Greater && all.wrong_surface_percent < TORN && after > FLICKER * before {
+            return Ok(f64::NEG_INFINITY);
+        }
+        let exact = made.worth(picture) - self.exact;
+        if made.settings.cell != usual.settings.cell {
+            return Ok(exact);
+        }
+        // Keys closer than usual ones take as many times the time.
+        let time = TIME * f64::from(CLOSEST) / f64::from(made.settings.key_interval.clamp(1, CLOSEST));
+        // Where surfaces bend, exact rays say what there is to gain, at any price.
+        let free_of_charge = all.path_error_texels.p99 >= BENT;
+        gain(keys, exact, [if free_of_charge { 0.0 } else { time }, time], || {
+            let before = self.visible.map_or_else(|| seen.worth(usual, flat, picture), Ok)?;
+            self.visible = Some(before);
+            Ok(seen.worth(made, flat, picture)? - before)
+        })
+    }
+}
+
 /// `usual`, or a bundle of other cells or intervals if that is worth more, as sparing counts it; and then why. Closer keys may be worth it by what is `seen`
 /// of them instead, and farther ones have to be by both. `all`: quality before sheets were left out; `space`: what a bundle of other cells is made with.
 ///
@@ -181,29 +222,7 @@ pub(crate) fn choose(
     let brief = scene.playback.frames <= BRIEF;
     let Some((climbs, why)) = climbs(usual.settings.cell, all, brief) else { return Ok((usual, None)) };
     let picture = usual.picture(flat);
-    // What is seen is told where it is asked for: the scene has to be rendered for it.
-    let (exact, mut visible) = (usual.worth(picture), None);
-    // Where surfaces bend, exact rays say what there is to gain, at any price.
-    let free_of_charge = all.path_error_texels.p99 >= BENT;
-    // By how much `made` is worth more than the usual one.
-    let mut gained = |made: &Made| -> Result<f64, BakeError> {
-        let [before, after] = [&usual, made].map(|made| made.quality.wrong_surface_percent);
-        let keys = made.settings.key_interval.cmp(&usual.settings.key_interval);
-        if keys == Ordering::Greater && all.wrong_surface_percent < TORN && after > FLICKER * before {
-            return Ok(f64::NEG_INFINITY);
-        }
-        let exact = made.worth(picture) - exact;
-        if made.settings.cell != usual.settings.cell {
-            return Ok(exact);
-        }
-        // Keys closer than usual ones take as many times the time.
-        let time = TIME * f64::from(CLOSEST) / f64::from(made.settings.key_interval.clamp(1, CLOSEST));
-        gain(keys, exact, [if free_of_charge { 0.0 } else { time }, time], || {
-            let before = visible.map_or_else(|| seen.worth(&usual, flat, picture), Ok)?;
-            visible = Some(before);
-            Ok(seen.worth(made, flat, picture)? - before)
-        })
-    };
+    let mut gains = Gains { usual: &usual, all, flat, seen, picture, exact: usual.worth(picture), visible: None };
     // Where a path turns quickly, or is short, keys stand much closer already.
     let (asked, spacing) = (usual.settings.key_interval, usual.encoded.grid.spacing());
     let stand = Settings { key_interval: if 2 * spacing <= asked { spacing } else { asked }, ..usual.settings };
@@ -222,7 +241,7 @@ pub(crate) fn choose(
             tried += 1;
             // Smaller cells may be more than a bundle can hold: then the usual ones it is.
             let Some(made) = Made::tried(scene, flat, Settings { space: space(settings.cell), ..*settings })? else { return Ok(None) };
-            let gained = gained(&made)?;
+            let gained = gains.of(&made)?;
             if gained > better.as_ref().map_or(0.0, |&(most, _)| most) {
                 better = Some((gained, made));
             }
