@@ -103,8 +103,8 @@ mod tests {
             kind: TexelKind::Indexed8,
             texels: (0..64 * 16).map(|at| u16::from(at % 64 >= 20)).collect(),
             palette: vec![[0; 3], [255; 3]],
-            covered: vec![true; 64 * 16],
-            outline: Outline { finer: 0, bits: vec![true; 64 * 16] },
+            covered: vec![true; 64 * 16].into(),
+            outline: Outline { finer: 0, bits: vec![true; 64 * 16].into() },
             labels: vec![label([60, 0, 64, 4]), label([0, 0, 16, 16]), label([20, 0, 28, 8])],
         };
         let mut sheets = sheets::find(&gbuffer, &grid, 1);

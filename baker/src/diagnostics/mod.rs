@@ -89,7 +89,7 @@ fn bordered(image: &SourceImage) -> Vec<u8> {
     let mut out: Vec<[u8; 3]> = image
         .texels
         .iter()
-        .zip(&image.covered)
+        .zip(image.covered.iter())
         .map(|(&texel, &covered)| {
             let colour = image.colour(texel);
             if covered { colour } else { colour.map(|v| v / 2) }
@@ -150,7 +150,7 @@ mod tests {
             assert_eq!([picture.width(), picture.height()], size, "{name}");
         }
         // Counted from the G-buffer alone.
-        let mut hidden = image.covered.clone();
+        let mut hidden = image.covered.to_vec();
         for uv in baked.flat.atlas.gbuffer.uv.iter() {
             hidden[uv[1] as usize * image.width as usize + uv[0] as usize] = false;
         }

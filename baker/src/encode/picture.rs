@@ -174,7 +174,7 @@ mod tests {
         for log2 in [4, 6, 7, 8, 9, 10] {
             for noise in [1, 7, 100] {
                 let (texels, covered) = disc(1 << log2, noise);
-                there_and_back(log2, &texels, Some(&Outline { finer: 0, bits: covered }));
+                there_and_back(log2, &texels, Some(&Outline { finer: 0, bits: covered.into() }));
                 there_and_back(log2, &texels[..4 << log2], None);
             }
         }
@@ -183,7 +183,7 @@ mod tests {
     #[test]
     fn plain_pictures_become_small() {
         let (texels, covered) = disc(256, 1);
-        let disc_of = Outline { finer: 0, bits: covered };
+        let disc_of = Outline { finer: 0, bits: covered.into() };
         let outline = there_and_back(8, &vec![0; texels.len()], Some(&disc_of)).len();
         let whole = there_and_back(8, &texels, Some(&disc_of)).len();
         // Less than a tenth of a bit a texel for the mask, half a bit for texels of a gradient.
