@@ -76,6 +76,21 @@ fn a_bake_that_fails_leaves_only_folders_that_were_there_or_hold_something() {
 }
 
 #[test]
+fn a_folder_of_diagnostics_shows_one_bake() {
+    let dir = folder();
+    let pictures = dir.path().join("pictures");
+    std::fs::create_dir(&pictures).unwrap();
+    for name in ["frame-0007-exact.png", "frame-0000-played.png", "frame-0007-mine.png", "frame-7-rays.png"] {
+        std::fs::write(pictures.join(name), "earlier").unwrap();
+    }
+    assert_eq!(bake(dir.path(), "a.obj", &["-o", "a.cubist", "--diagnostics", "pictures"]).status.code(), Some(0));
+    let frames: Vec<String> =
+        names(&pictures).into_iter().filter(|name| !name.starts_with("frame-0000") && !name.starts_with("frame-0001")).collect();
+    assert_eq!(frames, ["density.png", "frame-0007-mine.png", "frame-7-rays.png", "mask.png", "never-seen.png", "source-image.png"]);
+    assert_ne!(std::fs::read(pictures.join("frame-0000-played.png")).unwrap(), b"earlier");
+}
+
+#[test]
 fn memory_is_kept_to_or_what_it_takes_is_said() {
     let dir = folder();
     refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--ram", "1K"]), 1, "--ram: expected room for ");
