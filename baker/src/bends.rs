@@ -1,6 +1,8 @@
-//! Bends: how surfaces bend between the corners of cells, as far as that tells beforehand which space suits them. Where no curve through rays follows
-//! them, straight space shows as much; where curves do and straight lines are far off, it does not; in between both are tried. The G-buffer comes in from
-//! `job`.
+//! Bends: which kind of space suits surfaces, told beforehand by how they bend between the corners of cells.
+//! The G-buffer comes from `job`; the answer goes to `straight`.
+//!
+//! Where surfaces are so rough that no curve follows them, straight lines show as much as curves. Where curves follow them and straight lines are
+//! far off, straight lines show less. In between nothing is told, and both are tried.
 
 use crate::camera::segment;
 use crate::gbuffer::GBuffer;

@@ -1,7 +1,9 @@
-//! Brinks: how much else depends on a position than the pixels of its own sheet. Where a sheet of a torn cell shows as far as its chart reaches, pixels
-//! whose positions lie close by its edge, on either side of it, show another surface once they cross it. A sheet that few pixels see has many of these in a cell:
-//! coded as coarsely as its few pixels bear, all of the cell would show it.
+//! Brinks: positions that lie close by the edge of a chart, and how much depends on each.
 //! Lists with their order and tests come from `settle`; weights go to `encode`.
+//!
+//! In a torn cell the chart test shows a sheet as far as its chart reaches. A pixel whose position lies close by that edge, on either side, shows another
+//! surface as soon as an error moves the position across. So positions matter to more pixels than those that see their sheet. That counts most for a sheet
+//! that few pixels see: coded as coarsely as these few bear, it could show in the whole cell.
 
 use crate::atlas::SourceImage;
 use crate::order::{self, Chart, Evidence};
@@ -101,8 +103,8 @@ mod tests {
             kind: TexelKind::Indexed8,
             texels: (0..64 * 16).map(|at| u16::from(at % 64 >= 20)).collect(),
             palette: vec![[0; 3], [255; 3]],
-            covered: vec![true; 64 * 16],
-            outline: Outline { finer: 0, bits: vec![true; 64 * 16] },
+            covered: vec![true; 64 * 16].into(),
+            outline: Outline { finer: 0, bits: vec![true; 64 * 16].into() },
             labels: vec![label([60, 0, 64, 4]), label([0, 0, 16, 16]), label([20, 0, 28, 8])],
         };
         let mut sheets = sheets::find(&gbuffer, &grid, 1);

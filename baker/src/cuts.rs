@@ -1,6 +1,8 @@
-//! Cuts: between which frames the camera jumps, so that nothing seen after has to do with what was seen before; and turns so quick that two keys
-//! see nothing in common.
-//! The G-buffer comes in; the frames of the keys go out, with those added that keep interpolation on either side of each cut, and within a turn.
+//! Cuts, and turns too quick for the keys around them: where keys are added.
+//! The G-buffer and the keys' frames come in; the frames go out with more among them.
+//!
+//! At a cut the camera jumps, and nothing seen after it has to do with what was seen before: keys on either side keep interpolation from reaching across. In
+//! a quick turn two keys see hardly anything in common: keys go in between.
 
 use crate::gbuffer::GBuffer;
 use crate::sheets::KeyGrid;

@@ -13,25 +13,65 @@ use tempfile::NamedTempFile;
 /// No input file may be longer, bytes.
 const MAX_FILE: u64 = 2 << 30;
 
-/// Temporary files that are being written.
-static OPEN: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
-
-fn open() -> MutexGuard<'static, Vec<PathBuf>> {
-    OPEN.lock().unwrap_or_else(PoisonError::into_inner)
+/// What has been begun, and may not come to anything.
+struct Begun {
+    /// Temporary files that are being written.
+    files: Vec<PathBuf>,
+    /// Folders that were made, each after the one it lies in.
+    folders: Vec<PathBuf>,
 }
 
-/// Removes what is being written and leaves with exit code 130 when the user interrupts the program.
+impl Begun {
+    /// Makes `folder` and what it lies in.
+    fn make(&mut self, folder: &Path) -> std::io::Result<()> {
+        if folder.is_dir() {
+            return Ok(());
+        }
+        if let Some(parent) = folder.parent().filter(|parent| !parent.as_os_str().is_empty()) {
+            self.make(parent)?;
+        }
+        match std::fs::create_dir(folder) {
+            Ok(()) => self.folders.push(folder.to_owned()),
+            // Somebody else was quicker.
+            Err(_) if folder.is_dir() => {}
+            Err(error) => return Err(error),
+        }
+        Ok(())
+    }
+
+    /// Removes those of the folders that were made that nothing lies in.
+    fn remove_empty_folders(&mut self) {
+        for folder in self.folders.drain(..).rev() {
+            // The system refuses where anything lies in it.
+            let _ = std::fs::remove_dir(folder);
+        }
+    }
+}
+
+static BEGUN: Mutex<Begun> = Mutex::new(Begun { files: Vec::new(), folders: Vec::new() });
+
+fn begun() -> MutexGuard<'static, Begun> {
+    BEGUN.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes the folders that this run of the program has made and nothing lies in: for a program that fails.
+pub fn remove_empty_folders() {
+    begun().remove_empty_folders();
+}
+
+/// Removes what is being written, and folders made for it, and leaves with exit code 130 when the user interrupts the program.
 ///
 /// # Errors
 /// The system refuses the handler, or there is one already.
 pub fn clean_up_when_interrupted() -> Result<()> {
     ctrlc::set_handler(|| {
         // The list stays locked to the end: nobody begins a new file, nor finishes one half removed.
-        let files = open();
-        for file in files.iter() {
+        let mut begun = begun();
+        for file in &begun.files {
             // What cannot be removed is gone already.
             let _ = std::fs::remove_file(file);
         }
+        begun.remove_empty_folders();
         std::process::exit(130);
     })
     .context("Ctrl-C cannot be caught")
@@ -97,7 +137,7 @@ struct Listed(PathBuf);
 
 impl Drop for Listed {
     fn drop(&mut self) {
-        open().retain(|path| *path != self.0);
+        begun().files.retain(|path| *path != self.0);
     }
 }
 
@@ -109,15 +149,15 @@ fn begin(path: &Path) -> Result<(NamedTempFile, Listed)> {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     };
-    std::fs::create_dir_all(folder).with_context(|| format!("{}: the folder cannot be made", folder.display()))?;
+    let mut begun = begun();
+    begun.make(folder).with_context(|| format!("{}: the folder cannot be made", folder.display()))?;
     let mut builder = tempfile::Builder::new();
     builder.prefix(".cubist-").suffix(".tmp");
     // A temporary file is private by default; the finished one follows the user's umask like any other.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let mut list = open();
     let file = builder.tempfile_in(folder).with_context(|| format!("{}: the folder cannot be written to", folder.display()))?;
-    list.push(file.path().to_owned());
+    begun.files.push(file.path().to_owned());
     let listed = Listed(file.path().to_owned());
     Ok((file, listed))
 }
@@ -182,7 +222,7 @@ pub fn write_with(path: &Path, fill: impl FnOnce(&mut dyn Write) -> Result<()>) 
     let mut writer = BufWriter::new(file);
     fill(&mut writer)?;
     let file = writer.into_inner().map_err(|e| e.into_error()).with_context(failed)?;
-    let _whole = open();
+    let _whole = begun();
     file.persist(path).map_err(|e| e.error).with_context(|| format!("{}: the finished file cannot be put in its place", path.display()))?;
     Ok(())
 }
@@ -224,7 +264,7 @@ mod tests {
         assert!(failed.is_err());
         assert_eq!(std::fs::read(&path).unwrap(), b"first");
         assert_eq!(std::fs::read_dir(path.parent().unwrap()).unwrap().count(), 1);
-        assert!(open().iter().all(|file| !file.starts_with(dir.path())));
+        assert!(begun().files.iter().all(|file| !file.starts_with(dir.path())));
     }
 
     #[test]
@@ -285,7 +325,7 @@ mod tests {
         let path = dir.path().join("file.bin");
         write_with(&path, |out| {
             assert!(!path.exists());
-            assert_eq!(open().iter().filter(|file| file.starts_with(dir.path())).count(), 1);
+            assert_eq!(begun().files.iter().filter(|file| file.starts_with(dir.path())).count(), 1);
             Ok(out.write_all(b"whole")?)
         })
         .unwrap();

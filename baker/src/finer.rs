@@ -1,7 +1,25 @@
-//! Cells and keys of another shape: where so many outlines cross a cell that sheets are given up in a good part of the picture, cells half as large
-//! with keys twice as far apart may show more for the bytes, or keys twice as far apart as much for fewer; where positions hardly bend on their way
-//! from key to key, the latter alone, or else closer ones; where outlines are few but positions bend, keys twice as close show more, and on rough land
-//! cells twice as large besides, in less memory. A bundle baked as usual comes from `job`; the best of a few goes back.
+//! Other cells and key intervals than the usual ones, where trials show that they are worth it. A bundle baked as usual comes from `job`; the best of a few
+//! goes back, and why.
+//!
+//! Two figures of the usual bundle tell what to try. Its wrong pixels: from [`TORN`] on, outlines are *many*, so many cross a cell that sheets are given up.
+//! And by how much positions are off on their way from key to key: below [`STEADY`] they are *steady*, from [`BENT`] on they *bend*. `climbs` has the whole
+//! list; its main rows are:
+//!
+//! | outlines | positions | tried | because |
+//! |---|---|---|---|
+//! | many | steady, or cells are large | cells half as large with keys twice as far apart | shows more for the bytes |
+//! | | | else keys twice as far apart | shows as much for fewer bytes |
+//! | many | in between | keys twice as far apart | the same |
+//! | many | bend | nothing | |
+//! | few | steady | keys twice as far apart, and again | the same |
+//! | | | else closer ones | outlines may turn though surfaces go straight on |
+//! | few | in between | closer keys | the same |
+//! | few | bend | keys twice as close | shows more |
+//! | | | with cells twice as large besides | rough land: shows more, in less memory |
+//!
+//! Two kinds of paths have closer keys tried besides, down to one a frame, whatever crosses cells. Brief ones, of up to [`BRIEF`] frames, mostly go fast, and
+//! a trial of them takes little time: all that is tried counts there, not only what comes before the first gain. On longer ones something may pass close by
+//! the camera between two keys (see `passing`): closer keys then come first.
 
 use crate::bake::{BakeError, Flat, Progress, Settings};
 use crate::climb::{Free, Step, Take, climb};
@@ -146,6 +164,47 @@ fn gain<E>(keys: Ordering, exact: f64, time: [f64; 2], visible: impl FnOnce() ->
     }
 }
 
+/// What bundles are worth beside the usual one.
+struct Gains<'a> {
+    usual: &'a Made,
+    /// Its quality before sheets were left out.
+    all: &'a Brief,
+    /// What they are made from, and hold the scene against.
+    flat: &'a Flat,
+    seen: &'a Seen<'a>,
+    /// Bytes of the source image.
+    picture: usize,
+    /// What the usual one is worth beside exact rays,
+    exact: f64,
+    /// and by what is seen of it: told where it is asked for, as the scene has to be rendered for it.
+    visible: Option<f64>,
+}
+
+impl Gains<'_> {
+    /// By how much `made` is worth more.
+    fn of(&mut self, made: &Made) -> Result<f64, BakeError> {
+        let &mut Self { usual, all, flat, seen, picture, .. } = self;
+        let [before, after] = [usual, made].map(|made| made.quality.wrong_surface_percent);
+        let keys = made.settings.key_interval.cmp(&usual.settings.key_interval);
+        if keys == Ordering::Greater && all.wrong_surface_percent < TORN && after > FLICKER * before {
+            return Ok(f64::NEG_INFINITY);
+        }
+        let exact = made.worth(picture) - self.exact;
+        if made.settings.cell != usual.settings.cell {
+            return Ok(exact);
+        }
+        // Keys closer than usual ones take as many times the time.
+        let time = TIME * f64::from(CLOSEST) / f64::from(made.settings.key_interval.clamp(1, CLOSEST));
+        // Where surfaces bend, exact rays say what there is to gain, at any price.
+        let free_of_charge = all.path_error_texels.p99 >= BENT;
+        gain(keys, exact, [if free_of_charge { 0.0 } else { time }, time], || {
+            let before = self.visible.map_or_else(|| seen.worth(usual, flat, picture), Ok)?;
+            self.visible = Some(before);
+            Ok(seen.worth(made, flat, picture)? - before)
+        })
+    }
+}
+
 /// `usual`, or a bundle of other cells or intervals if that is worth more, as sparing counts it; and then why. Closer keys may be worth it by what is `seen`
 /// of them instead, and farther ones have to be by both. `all`: quality before sheets were left out; `space`: what a bundle of other cells is made with.
 ///
@@ -163,29 +222,7 @@ pub(crate) fn choose(
     let brief = scene.playback.frames <= BRIEF;
     let Some((climbs, why)) = climbs(usual.settings.cell, all, brief) else { return Ok((usual, None)) };
     let picture = usual.picture(flat);
-    // What is seen is told where it is asked for: the scene has to be rendered for it.
-    let (exact, mut visible) = (usual.worth(picture), None);
-    // Where surfaces bend, exact rays say what there is to gain, at any price.
-    let free_of_charge = all.path_error_texels.p99 >= BENT;
-    // By how much `made` is worth more than the usual one.
-    let mut gained = |made: &Made| -> Result<f64, BakeError> {
-        let [before, after] = [&usual, made].map(|made| made.quality.wrong_surface_percent);
-        let keys = made.settings.key_interval.cmp(&usual.settings.key_interval);
-        if keys == Ordering::Greater && all.wrong_surface_percent < TORN && after > FLICKER * before {
-            return Ok(f64::NEG_INFINITY);
-        }
-        let exact = made.worth(picture) - exact;
-        if made.settings.cell != usual.settings.cell {
-            return Ok(exact);
-        }
-        // Keys closer than usual ones take as many times the time.
-        let time = TIME * f64::from(CLOSEST) / f64::from(made.settings.key_interval.clamp(1, CLOSEST));
-        gain(keys, exact, [if free_of_charge { 0.0 } else { time }, time], || {
-            let before = visible.map_or_else(|| seen.worth(&usual, flat, picture), Ok)?;
-            visible = Some(before);
-            Ok(seen.worth(made, flat, picture)? - before)
-        })
-    };
+    let mut gains = Gains { usual: &usual, all, flat, seen, picture, exact: usual.worth(picture), visible: None };
     // Where a path turns quickly, or is short, keys stand much closer already.
     let (asked, spacing) = (usual.settings.key_interval, usual.encoded.grid.spacing());
     let stand = Settings { key_interval: if 2 * spacing <= asked { spacing } else { asked }, ..usual.settings };
@@ -204,7 +241,7 @@ pub(crate) fn choose(
             tried += 1;
             // Smaller cells may be more than a bundle can hold: then the usual ones it is.
             let Some(made) = Made::tried(scene, flat, Settings { space: space(settings.cell), ..*settings })? else { return Ok(None) };
-            let gained = gained(&made)?;
+            let gained = gains.of(&made)?;
             if gained > better.as_ref().map_or(0.0, |&(most, _)| most) {
                 better = Some((gained, made));
             }

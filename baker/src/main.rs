@@ -31,6 +31,7 @@ fn main() -> ExitCode {
     match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
+            files::remove_empty_folders();
             tell(format_args!("error: {error:#}"));
             ExitCode::from(1)
         }
@@ -47,7 +48,7 @@ fn bake(name: &str, output: &Path, args: &Bake) -> Result<()> {
     let start = Instant::now();
     let scene = load(name, &args.playback)?;
     let options = args.options(start.elapsed().as_secs_f64());
-    // A scene that is no good leaves no folders behind; what cannot be written is told before minutes of work.
+    // What cannot be written is told before minutes of work.
     files::check(output)?;
     if let Some(path) = &args.report {
         files::check(path)?;

@@ -220,8 +220,8 @@ mod tests {
             kind: TexelKind::Indexed8,
             texels: (0..64 * 16).map(|at| u16::from(at % 64 >= 20)).collect(),
             palette: greys.map(|grey| [grey; 3]).to_vec(),
-            covered: vec![true; 64 * 16],
-            outline: Outline { finer: 0, bits: vec![true; 64 * 16] },
+            covered: vec![true; 64 * 16].into(),
+            outline: Outline { finer: 0, bits: vec![true; 64 * 16].into() },
             labels: vec![label([60, 0, 64, 4]), label([0, 0, 16, 16]), label([20, 0, 28, 8])],
         }
     }
@@ -290,7 +290,7 @@ mod tests {
     fn what_goes_on_where_a_sheet_was_is_looked_up_there() {
         // Chart 1 is lighter along its top, as chart 2 is: without chart 2 it shows the same.
         let mut image = image([100, 255]);
-        image.texels[..20].fill(1);
+        image.texels = image.texels.iter().enumerate().map(|(at, &texel)| if at < 20 { 1 } else { texel }).collect();
         assert_eq!(pruned(&scene(1), &image, 13.0).lists[0], [1]);
     }
 

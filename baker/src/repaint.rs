@@ -131,7 +131,7 @@ impl Painter {
         let wanted: Vec<[u8; 3]> = (0..).zip(&before).zip(&shown).map(best).collect();
         let seen: Vec<u32> = shown.iter().map(|shown| shown.pixels as u32).collect();
         let (texels, palette) = atlas::reduced(&wanted, &seen, settings);
-        let painted = SourceImage { texels, palette, ..image.clone() };
+        let painted = SourceImage { texels: texels.into(), palette, ..image.clone() };
         let after = error(&shown, painted.texels.iter().map(|&texel| painted.colour(texel)));
         if after >= error(&shown, before.into_iter()) {
             return Ok(None);

@@ -1,6 +1,7 @@
-//! Bundles as they are seen: beside the antialiased scene, in the colours that they end up in. What outlines and texels lose there, no keys bring back, which
-//! exact rays do not tell. The scene and a painter come from `job`; `finer` asks what keys closer together or farther apart are worth, `usual`
-//! which of two is the better.
+//! How good bundles look: their frames beside the antialiased scene, in the colours that their texels get in the end.
+//! The scene and a painter come from `job`. `finer` asks what closer keys or keys farther apart are worth, `usual` which of two bundles is better.
+//!
+//! Exact rays through the source image do not tell that: what outlines and texels lose against the scene, no keys bring back.
 
 use crate::bake::{BakeError, Flat};
 use crate::made::Made;

@@ -1,6 +1,8 @@
-//! Settling: which sheet of a torn cell shows where. What a field has to tell depends on the sheets in front of its own, and which order and tests
-//! show least wrong depends on what fields tell: each is chosen for what the other is, by turns.
+//! Settling: which sheet of a torn cell shows where, by the order of its sheets, the test of each, and the fields that tests ask.
 //! Sheets come from `sheets`, positions from `fit`; order, tests and fields go to `encode`.
+//!
+//! Fields and order depend on each other. A field has to tell its sheet only from what no sheet in front covers, and which order and which tests show
+//! least wrong is a matter of the fields. So they are chosen by turns, each for what the other is.
 
 use crate::fields::{self, Fields};
 use crate::order::{self, Evidence, Looks};

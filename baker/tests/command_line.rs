@@ -57,13 +57,37 @@ fn what_cannot_be_written_is_said_before_the_work() {
     refused(&bake(dir.path(), "a.obj", &["-o", "new/"]), 1, "expected a file's name");
     refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--diagnostics", "plain"]), 1, "plain: the folder cannot be made");
     refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--report", "plain/a.json"]), 1, "plain: the folder cannot be made");
-    // Nor is a folder made for a scene that is no good.
-    refused(
-        &bake(dir.path(), "none.obj", &["-o", "new/a.cubist", "--report", "new/a.json", "--diagnostics", "pictures"]),
-        1,
-        "no such file",
-    );
     assert_eq!(names(dir.path()), ["a.obj", "plain"]);
+}
+
+#[test]
+fn a_bake_that_fails_leaves_only_folders_that_were_there_or_hold_something() {
+    let dir = folder();
+    std::fs::create_dir_all(dir.path().join("old/pictures")).unwrap();
+    let written = ["-o", "new/far/a.cubist", "--report", "old/new/a.json", "--diagnostics"];
+    // A scene that cannot be loaded; one that cannot be baked; a folder that cannot be made, beside others that can.
+    refused(&bake(dir.path(), "none.obj", &[&written[..], &["pictures"]].concat()), 1, "no such file");
+    refused(&bake(dir.path(), "a.obj", &[&written[..], &["old/pictures", "--ram", "1K"]].concat()), 1, "--ram: expected room for ");
+    refused(&bake(dir.path(), "a.obj", &[&written[..], &["a.obj"]].concat()), 1, "a.obj: the folder cannot be made");
+    assert_eq!((names(dir.path()), names(&dir.path().join("old"))), (vec!["a.obj".into(), "old".into()], vec!["pictures".into()]));
+    let output = bake(dir.path(), "a.obj", &[&written[..], &["new/pictures"]].concat());
+    assert_eq!(output.status.code(), Some(0), "{output:?}");
+    assert_eq!(names(&dir.path().join("new")), ["far", "pictures"]);
+}
+
+#[test]
+fn a_folder_of_diagnostics_shows_one_bake() {
+    let dir = folder();
+    let pictures = dir.path().join("pictures");
+    std::fs::create_dir(&pictures).unwrap();
+    for name in ["frame-0007-exact.png", "frame-0000-played.png", "frame-0007-mine.png", "frame-7-rays.png"] {
+        std::fs::write(pictures.join(name), "earlier").unwrap();
+    }
+    assert_eq!(bake(dir.path(), "a.obj", &["-o", "a.cubist", "--diagnostics", "pictures"]).status.code(), Some(0));
+    let frames: Vec<String> =
+        names(&pictures).into_iter().filter(|name| !name.starts_with("frame-0000") && !name.starts_with("frame-0001")).collect();
+    assert_eq!(frames, ["density.png", "frame-0007-mine.png", "frame-7-rays.png", "mask.png", "never-seen.png", "source-image.png"]);
+    assert_ne!(std::fs::read(pictures.join("frame-0000-played.png")).unwrap(), b"earlier");
 }
 
 #[test]
@@ -108,12 +132,12 @@ fn devices_are_no_scenes_and_stay_devices() {
 #[test]
 fn an_interrupted_bake_leaves_nothing() {
     let dir = folder();
-    let mut child = program(dir.path(), &["builtin:street", "-o", "new/a.cubist", "--frames", "2000"]).spawn().unwrap();
-    // The folder is made after the handler is set.
-    while !dir.path().join("new").exists() {
+    let mut child = program(dir.path(), &["builtin:street", "-o", "new/far/a.cubist", "--frames", "2000"]).spawn().unwrap();
+    // The folders are made after the handler is set.
+    while !dir.path().join("new/far").exists() {
         std::thread::sleep(std::time::Duration::from_millis(5));
     }
     assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
     assert_eq!(child.wait().unwrap().code(), Some(130));
-    assert!(names(&dir.path().join("new")).is_empty());
+    assert_eq!(names(dir.path()), ["a.obj"]);
 }

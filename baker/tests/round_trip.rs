@@ -8,6 +8,7 @@ use cubist_baker::sheets::{self, KeyGrid, Layers};
 use cubist_baker::{fields, fit, order, settle};
 use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC, TIME_HOLD, TIME_LINEAR, TexelKind};
 use cubist_core::{Bundle, Frame, Player};
+use std::sync::Arc;
 
 const SIZE: [u32; 2] = [100, 60];
 const FRAMES: u32 = 33;
@@ -22,7 +23,7 @@ fn gbuffer(looping: bool) -> (GBuffer, SourceImage) {
     ];
     let texels = (0..width * height).map(|i| u16::from(((i % width) * 7 + (i / width) * 13) as u8)).collect();
     let palette = (0..=255u8).map(|i| [i & 0xf8, i & 0xfc, (i << 3) & 0xf8]).collect();
-    let covered = vec![true; (width * height) as usize];
+    let covered: Arc<[bool]> = vec![true; (width * height) as usize].into();
     let outline = Outline { finer: 0, bits: covered.clone() };
     let image = SourceImage { width, height, kind: TexelKind::Indexed8, texels, palette, covered, outline, labels };
     let mut gbuffer = GBuffer { width: SIZE[0], height: SIZE[1], frames: FRAMES, label: Vec::new(), uv: Default::default() };

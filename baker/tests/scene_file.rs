@@ -2,7 +2,9 @@
 
 use cubist_baker::scene::{Background, Overrides, Scene, Up, load, load_builtin};
 use glam::{DVec3, Vec3};
+use std::fs::File;
 use std::path::Path;
+use std::time::{Duration, Instant};
 use tiff::encoder::{TiffEncoder, colortype};
 use tiff::tags::Tag;
 
@@ -147,6 +149,24 @@ fn errors_name_file_line_key_and_cure() {
             assert!(e.contains(part), "expected \"{part}\" in \"{e}\" for\n{text}");
         }
     }
+}
+
+#[test]
+fn a_model_of_an_unknown_ending_is_refused_unread() {
+    let start = Instant::now();
+    // Sparse: to read it thirty times would take half a minute.
+    let long = |folder: &Path| File::create(folder.join("a.fbx")).unwrap().set_len(1 << 30).unwrap();
+    for _ in 0..30 {
+        let e = scene_with("[scene]\nmodel = \"a.fbx\"\n", long, &Overrides::default()).unwrap_err();
+        let (file, rest) = e.split_once(": line 2: scene.model: ").unwrap_or_else(|| panic!("{e}"));
+        assert!(file.ends_with("szene eins.toml"), "{e}");
+        assert_eq!(rest, "found \"a.fbx\"; expected a .glb, .gltf, .obj, .ply or .stl file: convert the model");
+    }
+    assert!(start.elapsed() < Duration::from_secs(3), "{:?}", start.elapsed());
+    // Its first bytes may tell of a better cure.
+    let binary = |folder: &Path| std::fs::write(folder.join("a.vrm"), "glTF\u{2}\0\0\0").unwrap();
+    let e = scene_with("[scene]\nmodel = \"a.vrm\"\n", binary, &Overrides::default()).unwrap_err();
+    assert!(e.contains("the name ends in .vrm, and this is a binary glTF: rename it to .glb"), "{e}");
 }
 
 #[test]

@@ -186,65 +186,85 @@ fn apply(sections: &mut Vec<Own>, edit: Edit) {
         Edit::Limit(which, to) => path(sections, |path, _| limit(&mut path.limits, which, to)),
         Edit::Header(which, to) => path(sections, |path, _| header(path, which, to)),
         Edit::Frames(frames) => path(sections, |path, _| path.frames = frames),
-        Edit::Key { at, what, by } => path(sections, |path, room| {
-            *room = path.table.to_vec();
-            let entries = room.len() / KEY_BYTES;
-            let start = within(at.into(), entries) * KEY_BYTES;
-            if let Some(bytes) = room.get_mut(start..start + KEY_BYTES) {
-                let mut entry = KeyEntry::from_bytes((&*bytes).try_into().unwrap_or(&[0; KEY_BYTES]));
-                match what % 3 {
-                    0 => entry.frame = entry.frame.wrapping_add_signed(by.into()) & (u32::MAX >> 1),
-                    1 => entry.independent = !entry.independent,
-                    _ => entry.end = entry.end.wrapping_add_signed(by.into()),
-                }
-                bytes.copy_from_slice(&entry.to_bytes());
-            }
-            path.table = room;
-        }),
-        Edit::Label(at, which, to) => {
-            let Some((.., own)) = sections.iter_mut().find(|own| own.0 == LABELS) else { return };
-            let start = within(at.into(), own.len() / LABEL_BYTES) * LABEL_BYTES;
-            let Some(bytes) = own.get_mut(start..start + LABEL_BYTES) else { return };
-            let mut label = LabelRecord::from_bytes((&*bytes).try_into().unwrap_or(&[0; LABEL_BYTES]));
-            let numbers = [&mut label.left, &mut label.top, &mut label.right, &mut label.bottom, &mut label.origin_u, &mut label.origin_v];
-            match which % 9 {
-                6 => label.step_u = to,
-                7 => label.step_v = to,
-                8 => label.flags = to as u8,
-                which => numbers.into_iter().skip(which.into()).take(1).for_each(|number| *number = to),
-            }
-            bytes.copy_from_slice(&label.to_bytes());
-        }
-        Edit::Image(which, to) => {
-            let Some((.., own)) = sections.iter_mut().find(|own| own.0 == ATLAS) else { return };
-            let Ok(mut image) = postcard::from_bytes::<Atlas<'_>>(own) else { return };
-            match which % 5 {
-                0 => image.width_log2 = to as u8,
-                1 => image.height = to,
-                2 => image.encoding = to as u8,
-                3 => image.palette = image.palette.get(..usize::from(to) & !1).unwrap_or(image.palette),
-                _ => image.texels = image.texels.get(..usize::from(to)).unwrap_or(image.texels),
-            }
-            if let Ok(bytes) = postcard::to_stdvec(&image) {
-                *own = bytes;
-            }
-        }
-        Edit::Vector(at, to) => path(sections, |path, room| {
-            let planes = at % 2 == 0;
-            *room = if planes { path.planes.to_vec() } else { path.cameras.to_vec() };
-            let start = within(u32::from(at / 2), room.len());
-            // Wherever that is: across two numbers too.
-            room.iter_mut().skip(start).zip(to.to_le_bytes()).for_each(|(byte, new)| *byte = new);
-            *if planes { &mut path.planes } else { &mut path.cameras } = room;
-        }),
-        Edit::Records(length, seed) => path(sections, |path, room| {
-            // As long as they were in all, so that the table still holds: noise from the start on.
-            let (mut random, length) = (Random(seed.into()), usize::from(length));
-            *room = path.records.to_vec();
-            room.iter_mut().take(length).for_each(|byte| *byte = random.below(256) as u8);
-            path.records = room;
-        }),
+        Edit::Key { at, what, by } => path(sections, |path, room| key(path, room, [at, what], by)),
+        Edit::Label(at, which, to) => section(sections, LABELS, |own| label(own, [at, which], to)),
+        Edit::Image(which, to) => section(sections, ATLAS, |own| image(own, which, to)),
+        Edit::Vector(at, to) => path(sections, |path, room| vector(path, room, at, to)),
+        Edit::Records(length, seed) => path(sections, |path, room| records(path, room, length, seed)),
     }
+}
+
+/// Changes the section of that `tag`, if there is one.
+fn section(sections: &mut [Own], tag: [u8; 4], change: impl FnOnce(&mut Vec<u8>)) {
+    if let Some((.., own)) = sections.iter_mut().find(|own| own.0 == tag) {
+        change(own);
+    }
+}
+
+/// Changes a number of an entry of the key table.
+fn key<'a>(path: &mut Path<'a>, room: &'a mut Vec<u8>, [at, what]: [u8; 2], by: i16) {
+    *room = path.table.to_vec();
+    let entries = room.len() / KEY_BYTES;
+    let start = within(at.into(), entries) * KEY_BYTES;
+    if let Some(bytes) = room.get_mut(start..start + KEY_BYTES) {
+        let mut entry = KeyEntry::from_bytes((&*bytes).try_into().unwrap_or(&[0; KEY_BYTES]));
+        match what % 3 {
+            0 => entry.frame = entry.frame.wrapping_add_signed(by.into()) & (u32::MAX >> 1),
+            1 => entry.independent = !entry.independent,
+            _ => entry.end = entry.end.wrapping_add_signed(by.into()),
+        }
+        bytes.copy_from_slice(&entry.to_bytes());
+    }
+    path.table = room;
+}
+
+/// Changes a number of a label's record.
+fn label(own: &mut [u8], [at, which]: [u8; 2], to: u16) {
+    let start = within(at.into(), own.len() / LABEL_BYTES) * LABEL_BYTES;
+    let Some(bytes) = own.get_mut(start..start + LABEL_BYTES) else { return };
+    let mut label = LabelRecord::from_bytes((&*bytes).try_into().unwrap_or(&[0; LABEL_BYTES]));
+    let numbers = [&mut label.left, &mut label.top, &mut label.right, &mut label.bottom, &mut label.origin_u, &mut label.origin_v];
+    match which % 9 {
+        6 => label.step_u = to,
+        7 => label.step_v = to,
+        8 => label.flags = to as u8,
+        which => numbers.into_iter().skip(which.into()).take(1).for_each(|number| *number = to),
+    }
+    bytes.copy_from_slice(&label.to_bytes());
+}
+
+/// Changes a number of the source image's header.
+fn image(own: &mut Vec<u8>, which: u8, to: u16) {
+    let Ok(mut image) = postcard::from_bytes::<Atlas<'_>>(own) else { return };
+    match which % 5 {
+        0 => image.width_log2 = to as u8,
+        1 => image.height = to,
+        2 => image.encoding = to as u8,
+        3 => image.palette = image.palette.get(..usize::from(to) & !1).unwrap_or(image.palette),
+        _ => image.texels = image.texels.get(..usize::from(to)).unwrap_or(image.texels),
+    }
+    if let Ok(bytes) = postcard::to_stdvec(&image) {
+        *own = bytes;
+    }
+}
+
+/// Changes a number of a plane or a camera.
+fn vector<'a>(path: &mut Path<'a>, room: &'a mut Vec<u8>, at: u16, to: i32) {
+    let planes = at.is_multiple_of(2);
+    *room = if planes { path.planes.to_vec() } else { path.cameras.to_vec() };
+    let start = within(u32::from(at / 2), room.len());
+    // Wherever that is: across two numbers too.
+    room.iter_mut().skip(start).zip(to.to_le_bytes()).for_each(|(byte, new)| *byte = new);
+    *if planes { &mut path.planes } else { &mut path.cameras } = room;
+}
+
+/// Replaces the beginning of the key records by noise.
+fn records<'a>(path: &mut Path<'a>, room: &'a mut Vec<u8>, length: u16, seed: u8) {
+    // As long as they were in all, so that the table still holds: noise from the start on.
+    let (mut random, length) = (Random(seed.into()), usize::from(length));
+    *room = path.records.to_vec();
+    room.iter_mut().take(length).for_each(|byte| *byte = random.below(256) as u8);
+    path.records = room;
 }
 
 /// Changes the camera path; `change` gets room for bytes that the path borrows.

@@ -9,6 +9,7 @@ use cubist_baker::order::Coverage;
 use cubist_baker::sheets::{self, KeyGrid, Layers};
 use cubist_baker::{fit, order, settle};
 use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC, TexelKind};
+use std::sync::Arc;
 
 /// A screen all of one label, and how it is played.
 #[derive(Clone, Copy, Debug)]
@@ -57,7 +58,7 @@ impl Synthetic {
         let labels = vec![Label { rect: [0, 0, 1, 1], masked: false, fixed: None }, Label { rect, masked: false, fixed: None }];
         let texels = (0..width * height).map(|at| ((at % width * 7 + at / width * 13) & 0xff) as u16).collect();
         let palette = (0..=255u8).map(|at| [at & 0xf8, at & 0xfc, (at << 3) & 0xf8]).collect();
-        let covered = vec![true; (width * height) as usize];
+        let covered: Arc<[bool]> = vec![true; (width * height) as usize].into();
         let outline = Outline { finer: 0, bits: covered.clone() };
         let image = SourceImage { width, height, kind: TexelKind::Indexed8, texels, palette, covered, outline, labels };
         let pixels = (0..self.frames).flat_map(|frame| (0..down).flat_map(move |y| (0..across).map(move |x| (frame, x, y))));

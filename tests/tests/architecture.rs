@@ -1,8 +1,10 @@
 //! The layout that ARCHITECTURE.md describes, held against the sources: who may name what, and how a file looks.
 //! Every `.rs` file of the checkout comes in, and the manifests; out come the places that break a rule.
 
+mod circles;
 mod source;
 
+use circles::circles;
 use source::Source;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -218,20 +220,6 @@ fn the_core_imports_downwards() {
     assert_eq!(reexports.get("Bundle").map(String::as_str), Some("bundle"), "the re-exports are read as they should be");
 }
 
-/// Of modules, each with those that it imports, those that import what imports them, by whatever way.
-fn circles(mut imports: BTreeMap<String, BTreeSet<String>>) -> Vec<String> {
-    // What imports nothing that is left is in no circle.
-    let leaf = |left: &BTreeMap<String, BTreeSet<String>>| {
-        left.iter().find(|(_, named)| named.iter().all(|name| !left.contains_key(name))).map(|(name, _)| name.clone())
-    };
-    while let Some(name) = leaf(&imports) {
-        imports.remove(&name);
-    }
-    // What imports one is left, too: only what is imported by another of them.
-    let circle = imports.keys().filter(|name| imports.values().any(|named| named.contains(*name)));
-    circle.map(|name| format!("{name}: imports what imports it: {:?}", imports[name])).collect()
-}
-
 /// Modules are files beside `lib.rs`, and folders.
 #[test]
 fn the_baker_imports_in_no_circle() {
@@ -247,20 +235,23 @@ fn the_baker_imports_in_no_circle() {
     none(circles(imports));
 }
 
-/// Files name each other from `super`; what `mod.rs` holds itself is for the outside.
 #[test]
-fn the_files_of_charts_import_in_no_circle() {
-    let folder = "baker/src/chart/";
-    let mut imports: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-    for source in source::below(folder) {
-        let named = source::imports(&source.code_without_tests(), "super::").into_iter().collect();
-        imports.insert(source.path[folder.len()..].trim_end_matches(".rs").to_owned(), named);
+fn the_files_of_the_bakers_folders_import_in_no_circle() {
+    let sources = source::below("baker/src/");
+    let folders: Vec<&str> = sources.iter().filter_map(|source| source.path.strip_suffix("mod.rs")).collect();
+    for folder in ["baker/src/chart/", "baker/src/scene/", "baker/src/scene/gltf/"] {
+        assert!(folders.contains(&folder), "{folder} is not among {folders:?}");
     }
-    assert!(imports["merge"].contains("clusters") && imports["clusters"].contains("view"), "the imports are read as they should be");
-    let unknown =
-        imports.iter().flat_map(|(name, named)| named.iter().filter(|other| !imports.contains_key(*other)).map(move |other| (name, other)));
-    none(unknown.map(|(name, other)| format!("{folder}{name}.rs: {other} is none of the folder's files")).collect());
-    none(circles(imports));
+    let mut found = Vec::new();
+    for folder in folders {
+        let imports = circles::inside(folder, &sources);
+        found.extend(circles::circles(imports).into_iter().map(|circle| format!("{folder}{circle}")));
+    }
+    none(found);
+    let charts = circles::inside("baker/src/chart/", &sources);
+    assert!(charts["merge"].contains("clusters") && charts["clusters"].contains("view") && charts["mod"].contains("merge"), "{charts:?}");
+    let scenes = circles::inside("baker/src/scene/", &sources);
+    assert!(scenes["gltf"].contains("error") && scenes["gltf"].contains("model") && scenes["turned"].contains("mod"), "{scenes:?}");
 }
 
 #[test]

@@ -1,7 +1,6 @@
 //! Colouring: what each texel shows, and what lies between the charts.
 //! Places come from the packing, colours from [`Shader`]; the coloured image goes to the palette.
 
-use super::Seen;
 use super::footprint::fine;
 use super::grid::Grid;
 use super::pack::Layout;
@@ -19,6 +18,14 @@ const BEYOND: usize = 8;
 const EDGE: f64 = 1e-9;
 /// The cosine that faces without a projection are taken to be seen at.
 const OBLIQUE: f64 = 0.3;
+
+/// Which samples fall into each texel.
+pub(super) struct Seen {
+    /// How many.
+    pub count: Vec<u32>,
+    /// The first of them; `u32::MAX` if there is none.
+    pub first: Vec<u32>,
+}
 
 /// The image before its colours are reduced.
 pub(super) struct Filled {

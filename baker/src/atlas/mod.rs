@@ -20,6 +20,7 @@ use crate::gbuffer::{BACKGROUND, GBuffer, Hits};
 use crate::scene::{Background, Scene};
 use crate::shade::Shader;
 use cubist_core::format::{MOST_FINER, TexelKind};
+use fill::Seen;
 pub use outline::{Outline, Tiled};
 pub use palette::widened;
 use rayon::prelude::*;
@@ -136,7 +137,7 @@ pub struct Label {
     pub fixed: Option<Fixed>,
 }
 
-/// The one picture a bundle holds.
+/// The one picture a bundle holds. What is as long as the image is shared by its clones.
 #[derive(Clone, Debug)]
 pub struct SourceImage {
     /// Texels a row: 64, 128, 256, 512 or 1024.
@@ -146,11 +147,11 @@ pub struct SourceImage {
     /// What a texel is in the bundle.
     pub kind: TexelKind,
     /// Indices of `palette`, row-major.
-    pub texels: Vec<u16>,
+    pub texels: Arc<[u16]>,
     /// Colours, each one an RGB565 value widened by repeating its leading bits. Where the bundle's texels are colours themselves, all there are.
     pub palette: Vec<[u8; 3]>,
     /// Which texels show a surface rather than continue one.
-    pub covered: Vec<bool>,
+    pub covered: Arc<[bool]>,
     /// What of them does, as the player tells: finer than texels, perhaps.
     pub outline: Outline,
     /// Label 0 is the background.
@@ -293,9 +294,10 @@ pub(crate) fn of_charts(
     };
     // The finest that a bundle can hold.
     let asked = settings.outline.filter(|_| masked).and_then(|finer| (1..=finer).rev().find_map(outlined));
-    let outline = asked.unwrap_or_else(|| Outline { finer: 0, bits: filled.covered.clone() });
+    let covered: Arc<[bool]> = filled.covered.into();
+    let outline = asked.unwrap_or_else(|| Outline { finer: 0, bits: covered.clone() });
     let (width, height) = (layout.width, layout.height);
-    let image = SourceImage { width, height, kind, texels, palette, covered: filled.covered, outline, labels };
+    let image = SourceImage { width, height, kind, texels: texels.into(), palette, covered, outline, labels };
     progress(4, 4);
     Ok(Atlas { image, finer, gbuffer, figures })
 }
@@ -331,14 +333,6 @@ fn fixed(scene: &Scene, rect: &[u32; 4]) -> Fixed {
             step: [(x1 - x0) / scene.playback.width.max(1) as f32, (y1 - y0) / scene.playback.height.max(1) as f32],
         },
     }
-}
-
-/// Which samples fall into each texel.
-pub(crate) struct Seen {
-    /// How many.
-    pub count: Vec<u32>,
-    /// The first of them; `u32::MAX` if there is none.
-    pub first: Vec<u32>,
 }
 
 /// The G-buffer, and what of it falls into each texel.

@@ -11,6 +11,7 @@ use cubist_core::format::MOST_BLOCKS;
 use cubist_core::mask::{BLOCK_LOG2, Block, PLAIN, Tile};
 use rayon::prelude::*;
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// How far beyond an edge, as a barycentric weight, a bit's middle still is the face's.
 const EDGE: f64 = 1e-9;
@@ -21,7 +22,7 @@ pub struct Outline {
     /// 2^this bits are as wide and as high as a texel: 0..=[`cubist_core::format::MOST_FINER`].
     pub finer: u32,
     /// Row by row.
-    pub bits: Vec<bool>,
+    pub bits: Arc<[bool]>,
 }
 
 /// An outline as a bundle holds it: see [`cubist_core::mask`].
@@ -103,7 +104,7 @@ pub(super) fn outline(
     let [x0, y0, x1, y1] = layout.backdrop.map(|texel| (texel << finer) as usize);
     (y0..y1).for_each(|y| bits[y * row + x0..y * row + x1].fill(true));
     bits.iter_mut().enumerate().for_each(|(at, bit)| *bit &= covered[texel(at)]);
-    let outline = Outline { finer, bits };
+    let outline = Outline { finer, bits: bits.into() };
     outline.tiled(layout.width).is_some().then_some(outline)
 }
 
@@ -152,7 +153,7 @@ mod tests {
             assert!(tiles.len() == shape.tiles() && blocks.len() < tiles.len() && blocks[..2] == PLAIN);
             let mask = Mask { tiles: &tiles, blocks: &blocks, shape };
             let row = image.width << finer;
-            for (at, &bit) in (0..).zip(&image.outline.bits) {
+            for (at, &bit) in (0..).zip(image.outline.bits.iter()) {
                 let [u, v] = [at % row, at / row].map(|k| ((2 * k + 1) << 15 >> finer) as i32);
                 assert_eq!(mask.covers(PlayUv { u, v }), bit, "{at}");
             }

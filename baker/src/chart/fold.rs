@@ -4,6 +4,7 @@
 use super::charting::{Charting, Projection};
 use super::observe::Links;
 use crate::gbuffer::{BACKGROUND, Hits};
+use glam::DVec3;
 use rayon::prelude::*;
 use std::collections::VecDeque;
 
@@ -148,14 +149,28 @@ fn examine<'t>(
     if faces.iter().all(|&f| touched(f).is_empty()) {
         return Vec::new();
     }
-    let g = grid(charting, chart as usize);
-    let mut depths = vec![f32::NAN; (g.width * g.height) as usize];
     let mut order = faces.to_vec();
     order.sort_by_key(|&f| (std::cmp::Reverse(charting.faces.list[f as usize].hits), f));
     faces.iter().for_each(|&f| state[f as usize] = WAITING);
+    lay_down(charting, links, &order, (&grid(charting, chart as usize), normal), state, touched);
+    let parts = rejected(links, &order, state);
+    faces.iter().for_each(|&f| state[f as usize] = OUTSIDE);
+    parts
+}
+
+/// Lays faces down in `order`, and after each its neighbours, on a grid of texels; `normal`: that of their plane. What would cover others is rejected.
+fn lay_down<'t>(
+    charting: &Charting,
+    links: &Links,
+    order: &[u32],
+    (g, normal): (&Grid, Option<DVec3>),
+    state: &mut [u8],
+    touched: impl Fn(u32) -> &'t [Touch],
+) {
+    let mut depths = vec![f32::NAN; (g.width * g.height) as usize];
     let mut queue = VecDeque::new();
     let mut kept = 0;
-    for &seed in &order {
+    for &seed in order {
         if state[seed as usize] != WAITING {
             continue;
         }
@@ -163,15 +178,7 @@ fn examine<'t>(
         state[seed as usize] = QUEUED;
         while let Some(f) = queue.pop_front() {
             let touches = touched(f);
-            let slope = match normal {
-                Some(normal) => {
-                    let cosine = charting.faces.list[f as usize].normal.dot(normal).abs().max(0.2);
-                    (1.0 / (cosine * cosine) - 1.0).sqrt()
-                }
-                // No step along the surface is more than what the face is stretched by, unless it is stretched much more one way.
-                None => 2.0 * charting.stretch(f as usize),
-            };
-            let step = ((2.0 + 2.0 * slope) / g.density) as f32;
+            let step = ((2.0 + 2.0 * slope(charting, f as usize, normal)) / g.density) as f32;
             let over = |t: &&Touch| (depth(t.depth) - depths[t.texel as usize]).abs() > step;
             let bad = touches.iter().filter(over).count();
             if bad > 0 && bad * TOLERATED >= touches.len() && kept > 0 {
@@ -194,8 +201,24 @@ fn examine<'t>(
             }
         }
     }
+}
+
+/// How much deeper a face gets along its chart, at most, over as much of it.
+fn slope(charting: &Charting, face: usize, normal: Option<DVec3>) -> f64 {
+    match normal {
+        Some(normal) => {
+            let cosine = charting.faces.list[face].normal.dot(normal).abs().max(0.2);
+            (1.0 / (cosine * cosine) - 1.0).sqrt()
+        }
+        // No step along the surface is more than what the face is stretched by, unless it is stretched much more one way.
+        None => 2.0 * charting.stretch(face),
+    }
+}
+
+/// The connected parts of what was rejected, in `order`; nothing is any more.
+fn rejected(links: &Links, order: &[u32], state: &mut [u8]) -> Vec<Vec<u32>> {
     let mut parts = Vec::new();
-    for &seed in &order {
+    for &seed in order {
         if state[seed as usize] != REJECTED {
             continue;
         }
@@ -213,6 +236,5 @@ fn examine<'t>(
         }
         parts.push(part);
     }
-    faces.iter().for_each(|&f| state[f as usize] = OUTSIDE);
     parts
 }

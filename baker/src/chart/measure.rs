@@ -3,7 +3,7 @@
 
 use super::blur::{Loss, Seen};
 use super::charting::{COARSER, Chart, Charting, Density, Projection};
-use crate::gbuffer::{BACKGROUND, Hits, Lens};
+use crate::gbuffer::{BACKGROUND, Hits, Lens, Sample};
 use crate::scene::Scene;
 use glam::DVec3;
 use rayon::prelude::*;
@@ -100,35 +100,7 @@ pub(super) fn measure(scene: &Scene, hits: &Hits, seen: Option<&Seen>, charting:
         .samples
         .par_chunks(chunk.max(1))
         .enumerate()
-        .map(|(part, samples)| {
-            let mut table: Vec<Option<Box<Figures>>> = vec![None; charting.charts.len()];
-            for (i, frame) in samples.chunks(frame_size.max(1)).enumerate() {
-                let lens = Lens::new(scene, (part * chunk / frame_size.max(1) + i) as u32);
-                for s in frame.iter().filter(|s| s.surface != BACKGROUND) {
-                    let id = charting.faces.of[s.surface as usize] as usize;
-                    let face = &charting.faces.list[id];
-                    let figures = table[charting.chart_of[id] as usize].get_or_insert_with(|| Box::new(Figures::new()));
-                    let ray = face.point(s) - lens.eye;
-                    let (z, slant) = (ray.dot(lens.forward).max(1e-12), ray.dot(face.normal).abs());
-                    // Square root of the pixels a unit of area covers: f^2 cos / (z^3 / l).
-                    let chart = &charting.charts[charting.chart_of[id] as usize];
-                    let unit = match chart.projection {
-                        // Flattened lengths shrink with the distance from the view's eye.
-                        Projection::Point(eye, [_, _, back], near) => ((eye - face.point(s)).dot(back) / near).max(1e-3),
-                        _ => charting.stretch(id),
-                    };
-                    figures.densities[bin(unit * lens.focal * (slant / (z * z * z)).sqrt())] += 1;
-                    figures.hits += 1;
-                    let [u, v, _] = charting.flat(id, f64::from(s.b), f64::from(s.c));
-                    for (k, [x, y]) in turns.iter().enumerate() {
-                        let along = u * x + v * y;
-                        figures.reach[k] = figures.reach[k].max(along);
-                        figures.reach[TURNS + k] = figures.reach[TURNS + k].max(-along);
-                    }
-                }
-            }
-            table
-        })
+        .map(|(part, samples)| table(scene, charting, &turns, part * chunk / frame_size.max(1), samples.chunks(frame_size.max(1))))
         .collect();
     let areas = areas(charting);
     let merged = |chart: usize| {
@@ -147,6 +119,43 @@ pub(super) fn measure(scene: &Scene, hits: &Hits, seen: Option<&Seen>, charting:
     }
     charting.flatten(scene);
     snap(charting);
+}
+
+/// What some frames, from number `first` on, say about each chart; `None` about those that they do not see.
+fn table<'s>(
+    scene: &Scene,
+    charting: &Charting,
+    turns: &[[f64; 2]; TURNS],
+    first: usize,
+    frames: impl Iterator<Item = &'s [Sample]>,
+) -> Vec<Option<Box<Figures>>> {
+    let mut table: Vec<Option<Box<Figures>>> = vec![None; charting.charts.len()];
+    for (number, frame) in (first..).zip(frames) {
+        let lens = Lens::new(scene, number as u32);
+        for s in frame.iter().filter(|s| s.surface != BACKGROUND) {
+            let id = charting.faces.of[s.surface as usize] as usize;
+            let face = &charting.faces.list[id];
+            let figures = table[charting.chart_of[id] as usize].get_or_insert_with(|| Box::new(Figures::new()));
+            let ray = face.point(s) - lens.eye;
+            let (z, slant) = (ray.dot(lens.forward).max(1e-12), ray.dot(face.normal).abs());
+            // Square root of the pixels a unit of area covers: f^2 cos / (z^3 / l).
+            let chart = &charting.charts[charting.chart_of[id] as usize];
+            let unit = match chart.projection {
+                // Flattened lengths shrink with the distance from the view's eye.
+                Projection::Point(eye, [_, _, back], near) => ((eye - face.point(s)).dot(back) / near).max(1e-3),
+                _ => charting.stretch(id),
+            };
+            figures.densities[bin(unit * lens.focal * (slant / (z * z * z)).sqrt())] += 1;
+            figures.hits += 1;
+            let [u, v, _] = charting.flat(id, f64::from(s.b), f64::from(s.c));
+            for (k, [x, y]) in turns.iter().enumerate() {
+                let along = u * x + v * y;
+                figures.reach[k] = figures.reach[k].max(along);
+                figures.reach[TURNS + k] = figures.reach[TURNS + k].max(-along);
+            }
+        }
+    }
+    table
 }
 
 /// What the faces of each chart cover, flattened, square units.

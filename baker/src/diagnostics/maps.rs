@@ -1,8 +1,8 @@
 //! Maps of the source image: what was never seen, and where it is too coarse or too fine.
 //! Figures come from `texels`; pictures go to `diagnostics`, which writes them.
 
+use super::picture::{Picture, SIDE};
 use super::texels::Seen;
-use super::{Picture, SIDE};
 use cubist_baker::atlas::SourceImage;
 
 /// The colour of texels that no pixel falls on; nothing else in its picture is as bright.

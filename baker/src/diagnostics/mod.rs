@@ -2,10 +2,11 @@
 //! A finished job comes in; PNG files go out.
 
 mod maps;
+mod picture;
 mod rays;
 mod texels;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use cubist_baker::atlas::SourceImage;
 use cubist_baker::files::write_png;
 use cubist_baker::job::Baked;
@@ -13,46 +14,17 @@ use cubist_baker::truth::spread;
 use cubist_baker::verify;
 use std::path::Path;
 
+/// What is shown of a frame: what the names of its pictures end in.
+const KINDS: [&str; 4] = ["exact", "played", "compare", "rays"];
 /// Frames shown exact and played.
 const FRAMES: u32 = 3;
 /// How much stronger than it is a difference is shown.
 const GAIN: u8 = 4;
 /// The colour of the charts' borders.
 const BORDER: [u8; 3] = [255, 0, 255];
-/// Width of enlarged pictures of the source image, pixels: a whole number for a texel.
-const SIDE: u32 = 1024;
-
-/// A picture [`SIDE`] pixels wide.
-struct Picture {
-    pixels: Vec<[u8; 3]>,
-}
-
-impl Picture {
-    /// Texels of a source image of `width` texels a row, each as a square.
-    fn enlarged(texels: &[[u8; 3]], width: u32) -> Self {
-        let scale = (SIDE / width) as usize;
-        let row = |row: &[[u8; 3]]| -> Vec<[u8; 3]> { row.iter().flat_map(|&texel| std::iter::repeat_n(texel, scale)).collect() };
-        Self { pixels: texels.chunks(width as usize).flat_map(|texels| row(texels).repeat(scale)).collect() }
-    }
-
-    fn height(&self) -> u32 {
-        self.pixels.len() as u32 / SIDE
-    }
-
-    /// Fills a rectangle: left, top, right, bottom.
-    fn fill(&mut self, [left, top, right, bottom]: [u32; 4], colour: [u8; 3]) {
-        for y in top..bottom {
-            self.pixels[(y * SIDE + left) as usize..(y * SIDE + right) as usize].fill(colour);
-        }
-    }
-
-    fn write(&self, path: &Path) -> Result<()> {
-        write_png(path, SIDE, self.pixels.as_flattened())
-    }
-}
-
 /// Writes into `folder`: source-image.png, mask.png, never-seen.png and density.png; for three frames and the worst one frame-NNNN-exact.png,
-/// frame-NNNN-played.png, frame-NNNN-compare.png (exact, played, their difference four times as strong) and frame-NNNN-rays.png.
+/// frame-NNNN-played.png, frame-NNNN-compare.png (exact, played, their difference four times as strong) and frame-NNNN-rays.png. Pictures of other frames,
+/// which an earlier bake left there, are removed.
 pub fn write(folder: &Path, baked: &Baked) -> Result<()> {
     let (flat, report) = (&baked.flat, &baked.report);
     let image = &flat.atlas.image;
@@ -70,20 +42,45 @@ pub fn write(folder: &Path, baked: &Baked) -> Result<()> {
     frames.sort_unstable();
     frames.dedup();
     verify::play(&baked.bundle, &frames, |frame, played| {
-        let name = |kind: &str| folder.join(format!("frame-{frame:04}-{kind}.png"));
+        let [exact_name, played_name, compare_name, rays_name] = KINDS.map(|kind| folder.join(name(frame, kind)));
         let write = || {
             let exact = verify::exact_frame(&flat.atlas, frame);
-            write_png(&name("exact"), gbuffer.width, &exact)?;
-            write_png(&name("played"), gbuffer.width, played)?;
+            write_png(&exact_name, gbuffer.width, &exact)?;
+            write_png(&played_name, gbuffer.width, played)?;
             let difference: Vec<u8> = exact.iter().zip(played).map(|(a, b)| a.abs_diff(*b).saturating_mul(GAIN)).collect();
-            write_png(&name("compare"), gbuffer.width * 3, &side_by_side(gbuffer.width, [&exact, played, &difference]))?;
-            rays::draw(flat, frame, report.grid.cell).write(&name("rays"))
+            write_png(&compare_name, gbuffer.width * 3, &side_by_side(gbuffer.width, [&exact, played, &difference]))?;
+            rays::draw(flat, frame, report.grid.cell).write(&rays_name)
         };
         if result.is_ok() {
             result = write();
         }
     })?;
-    result
+    result.and_then(|()| remove_others(folder, &frames))
+}
+
+/// What the picture of that `kind` of a frame is called.
+fn name(frame: u32, kind: &str) -> String {
+    format!("frame-{frame:04}-{kind}.png")
+}
+
+/// The frame whose picture has this name.
+fn frame_of(file: &str) -> Option<u32> {
+    let (frame, _) = file.strip_prefix("frame-")?.split_once('-')?;
+    let frame = frame.parse().ok()?;
+    // Numbers are written in other ways, too, but not by us.
+    KINDS.iter().any(|kind| name(frame, kind) == file).then_some(frame)
+}
+
+/// Removes the pictures of other frames than `frames` from `folder`.
+fn remove_others(folder: &Path, frames: &[u32]) -> Result<()> {
+    for entry in std::fs::read_dir(folder).with_context(|| format!("{}: the folder cannot be read", folder.display()))?.flatten() {
+        let other = entry.file_name().to_str().and_then(frame_of).is_some_and(|frame| !frames.contains(&frame));
+        if other && entry.file_type().is_ok_and(|kind| kind.is_file()) {
+            let path = entry.path();
+            std::fs::remove_file(&path).with_context(|| format!("{}: the picture of an earlier bake cannot be removed", path.display()))?;
+        }
+    }
+    Ok(())
 }
 
 /// The source image; texels without a surface at half brightness, the labels' rectangles and the charts' outlines drawn over it.
@@ -92,7 +89,7 @@ fn bordered(image: &SourceImage) -> Vec<u8> {
     let mut out: Vec<[u8; 3]> = image
         .texels
         .iter()
-        .zip(&image.covered)
+        .zip(image.covered.iter())
         .map(|(&texel, &covered)| {
             let colour = image.colour(texel);
             if covered { colour } else { colour.map(|v| v / 2) }
@@ -120,6 +117,7 @@ fn side_by_side(width: u32, pictures: [&[u8]; 3]) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
+    use super::picture::SIDE;
     use super::*;
     use cubist_baker::scene::builtin;
     use cubist_baker::{Options, TruthFrames, job};
@@ -130,7 +128,10 @@ mod tests {
         (scene.playback.width, scene.playback.height, scene.playback.frames) = (64, 48, 5);
         let baked = job::run(&scene, &Options { truth: TruthFrames::None, ..Options::default() }, &|_, _| {}).expect("a bundle");
         let folder = tempfile::tempdir().expect("a folder");
+        let earlier = folder.path().join(name(5, "exact"));
+        std::fs::write(&earlier, "earlier").expect("a file");
         write(folder.path(), &baked).expect("pictures");
+        assert!(!earlier.exists(), "there are five frames");
         let image = &baked.flat.atlas.image;
         let tall = image.height * SIDE / image.width;
         let mut sizes = vec![
@@ -149,7 +150,7 @@ mod tests {
             assert_eq!([picture.width(), picture.height()], size, "{name}");
         }
         // Counted from the G-buffer alone.
-        let mut hidden = image.covered.clone();
+        let mut hidden = image.covered.to_vec();
         for uv in baked.flat.atlas.gbuffer.uv.iter() {
             hidden[uv[1] as usize * image.width as usize + uv[0] as usize] = false;
         }
@@ -157,5 +158,30 @@ mod tests {
         let shown = open("never-seen").pixels().filter(|pixel| pixel.0 == maps::NEVER).count();
         let square = (SIDE / image.width).pow(2) as usize;
         assert!(never > 0 && shown == never * square, "{never} texels are never seen, {shown} pixels of {square} a texel say so");
+    }
+
+    #[test]
+    fn pictures_of_other_frames_are_removed_and_nothing_else() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let files = [
+            ("frame-0001-exact.png", false),
+            ("frame-0002-compare.png", true),
+            ("frame-12345-rays.png", false),
+            ("frame-7-exact.png", true),
+            ("frame-+007-exact.png", true),
+            ("frame-00007-exact.png", true),
+            ("frame-0007-mine.png", true),
+            ("frame-0007.png", true),
+            ("frame-0007-exact.png.bak", true),
+            ("frame-99999999999-exact.png", true),
+        ];
+        for (name, _) in files {
+            std::fs::write(folder.path().join(name), "earlier").expect(name);
+        }
+        std::fs::create_dir(folder.path().join("frame-0008-exact.png")).expect("a folder");
+        remove_others(folder.path(), &[0, 2, 4]).expect("removed");
+        for (name, kept) in files.into_iter().chain([("frame-0008-exact.png", true)]) {
+            assert_eq!(folder.path().join(name).exists(), kept, "{name}");
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! A frame's rays in the source image: where its pixels fall, and the key-ray grid as the surfaces bend it.
 //! The G-buffer comes from a finished job; pictures go to `diagnostics`, which writes them.
 
-use super::{Picture, SIDE};
+use super::picture::{Picture, SIDE};
 use cubist_baker::bake::Flat;
 use cubist_baker::tears::{DOWN, RIGHT};
 

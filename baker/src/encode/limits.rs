@@ -1,7 +1,7 @@
 //! The bounds that a bundle states: what the fullest key, row, interval and cell hold.
 //! Lists and layers come from the baker's stages; the bounds go into the path's header, and size the encoder's memory.
 
-use super::{CodingSettings, Content};
+use super::content::{CodingSettings, Content};
 use crate::fields::tests_field;
 use crate::sheets::Sheets;
 use cubist_core::format::{LabelRecord, Limits, STRIP, reach};

@@ -1,14 +1,15 @@
 //! Encoding: ordered sheets, fitted layers and the source image become the bytes of a bundle.
 //! The stream is described by `cubist_core::record`; this drives it and keeps the bounds it states.
 
+mod content;
 mod limits;
 mod picture;
 mod range;
 
 use crate::atlas::{SourceImage, Storage};
-use crate::fields::{self, Fields, Thin};
-use crate::fit::Fit;
-use crate::sheets::{KeyGrid, Layers, Sheets};
+use crate::fields::{self, Thin};
+use crate::sheets::KeyGrid;
+pub use content::{CodingSettings, Content};
 use cubist_core::coder::Probability;
 use cubist_core::fixed::{KEY_MAX, KEY_MIN};
 use cubist_core::format::{
@@ -21,29 +22,8 @@ use cubist_core::nodes::{self, Layout, Trace};
 use cubist_core::plane::{CAMERA_BYTES, Camera, PLANE_BYTES, Plane, View};
 use cubist_core::record::{LISTS, MAX_KEYS, Place, Shape, Stream};
 pub use limits::Exceeded;
-pub use picture::{Unpacked, image_bytes, packed, raw_bytes, unpacked};
+pub use picture::{Unpacked, image_bytes, packed, raw_bytes, rgb565, unpacked};
 use range::Encoder;
-
-/// How keys are coded.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CodingSettings {
-    /// Coordinates are stored in steps of 2^this of their units: 1/64 texel, 1/32 where the picture is wider or higher than 512 texels.
-    pub step_log2: u8,
-    /// What a bit is worth, in squared texels of error summed over pixels, when residuals are rounded towards zero; 0 keeps
-    /// them all.
-    pub lambda: f32,
-    /// Every this many keys one that needs no earlier one; bounds what a seek decodes.
-    pub independent_every: usize,
-}
-
-impl CodingSettings {
-    /// The same where a bit is worth `lambda`, in steps as coarse as lose no more than that does.
-    #[must_use]
-    pub(crate) fn worth(self, lambda: f32) -> Self {
-        let coarser = [0.02, 0.06, 0.6].into_iter().take_while(|&least| lambda >= least);
-        Self { lambda, step_log2: coarser.count() as u8, ..self }
-    }
-}
 
 /// What goes into a bundle besides the keys.
 #[derive(Clone, Copy, Debug)]
@@ -54,27 +34,6 @@ pub struct Header<'a> {
     pub fps: u16,
     /// A text for people.
     pub info: &'a str,
-}
-
-/// Everything that becomes a bundle.
-#[derive(Clone, Copy)]
-pub struct Content<'a> {
-    /// The key-ray grid.
-    pub grid: &'a KeyGrid,
-    /// The source image.
-    pub image: &'a SourceImage,
-    /// The sheets, front to back.
-    pub sheets: &'a Sheets,
-    /// The layers they share.
-    pub layers: &'a Layers,
-    /// The layers' positions.
-    pub fit: &'a Fit,
-    /// The layers' fields.
-    pub fields: &'a Fields,
-    /// The planes that positions are told from, labels ascending.
-    pub planes: &'a [Plane],
-    /// From where every key looks, where there are planes.
-    pub cameras: &'a [Camera],
 }
 
 /// Makes the bytes of a bundle.
@@ -172,12 +131,6 @@ fn sealed(envelope: &Envelope<'_>) -> Vec<u8> {
 
 fn postcard_bytes<T: serde::Serialize>(value: &T) -> Vec<u8> {
     postcard::to_stdvec(value).unwrap_or_else(|error| unreachable!("plain structs of numbers and slices always serialise: {error}"))
-}
-
-/// A colour in the display's 5, 6 and 5 bits.
-#[must_use]
-pub fn rgb565([r, g, b]: [u8; 3]) -> u16 {
-    u16::from(r >> 3) << 11 | u16::from(g >> 2) << 5 | u16::from(b >> 3)
 }
 
 /// Fraction bits of coordinates: the finest that leave as much room beside the picture as it is wide, half of it on either side.

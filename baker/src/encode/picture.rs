@@ -2,7 +2,6 @@
 //! The core describes the stream (`cubist_core::pack`); `encode` puts the bytes into bundles, `inspect` and the search ask for them.
 
 use super::range::Encoder;
-use super::rgb565;
 use crate::atlas::{SourceImage, Storage, Tiled};
 use cubist_core::Bundle;
 use cubist_core::coder::{Bits, Decoder, Probability};
@@ -108,6 +107,12 @@ pub fn image_bytes(image: &SourceImage, storage: Storage) -> usize {
     stored + 2 * entries + LABEL_BYTES * image.labels.len()
 }
 
+/// A colour in the display's 5, 6 and 5 bits.
+#[must_use]
+pub fn rgb565([r, g, b]: [u8; 3]) -> u16 {
+    u16::from(r >> 3) << 11 | u16::from(g >> 2) << 5 | u16::from(b >> 3)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -169,7 +174,7 @@ mod tests {
         for log2 in [4, 6, 7, 8, 9, 10] {
             for noise in [1, 7, 100] {
                 let (texels, covered) = disc(1 << log2, noise);
-                there_and_back(log2, &texels, Some(&Outline { finer: 0, bits: covered }));
+                there_and_back(log2, &texels, Some(&Outline { finer: 0, bits: covered.into() }));
                 there_and_back(log2, &texels[..4 << log2], None);
             }
         }
@@ -178,7 +183,7 @@ mod tests {
     #[test]
     fn plain_pictures_become_small() {
         let (texels, covered) = disc(256, 1);
-        let disc_of = Outline { finer: 0, bits: covered };
+        let disc_of = Outline { finer: 0, bits: covered.into() };
         let outline = there_and_back(8, &vec![0; texels.len()], Some(&disc_of)).len();
         let whole = there_and_back(8, &texels, Some(&disc_of)).len();
         // Less than a tenth of a bit a texel for the mask, half a bit for texels of a gradient.

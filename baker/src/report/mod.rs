@@ -1,22 +1,22 @@
 //! The report: what a bake cost and what it reached, for people and scripts.
 //! Figures come from the finished bytes through [`Inspection`] and `verify`; JSON goes out, and by `table` rows of text.
 
+mod origin;
 mod table;
 mod warnings;
 
 use crate::atlas::Storage;
-use crate::bake::{Encoded, Flat, Settings};
 use crate::bends::Bends;
 use crate::causes::Causes;
 use crate::chart::{Family, Trial};
 use crate::inspect::{Inspection, space_name, time_name};
 use crate::outlines;
-use crate::scene::Scene;
 use crate::straight;
 use crate::verify::{Quality, TruthQuality, Work};
 use cubist_core::format::{ATLAS, LABELS, MASK, SPACE_LINEAR, TexelKind};
 use serde::{Deserialize, Serialize};
 
+pub(crate) use origin::Origin;
 pub use table::table;
 
 /// Seconds by stage, wall clock.
@@ -254,22 +254,6 @@ pub struct Report {
     pub effects: Vec<String>,
     /// What the user should know.
     pub warnings: Vec<String>,
-}
-
-/// Where a bundle comes from.
-pub(crate) struct Origin<'a> {
-    pub scene: &'a Scene,
-    pub flat: &'a Flat,
-    pub encoded: &'a Encoded,
-    pub settings: &'a Settings,
-    /// Kinds of space that were tried.
-    pub spaces: Vec<straight::Trial>,
-    /// How surfaces bend, where that tells anything.
-    pub bends: Option<Bends>,
-    /// Outlines that were tried.
-    pub outlines: Vec<outlines::Trial>,
-    /// Texels were coloured by the pixels that show them.
-    pub repainted: bool,
 }
 
 impl Report {

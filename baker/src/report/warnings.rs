@@ -1,6 +1,6 @@
 //! What the user should know of a bundle: what it does not show, and what to do about that. Figures come from the report's own origin.
 
-use super::Origin;
+use super::origin::Origin;
 use crate::finer::uneven;
 use crate::verify::Quality;
 

@@ -1,7 +1,7 @@
 //! What can be wrong with a scene, said so that it can be put right; and what was merely approximated.
 //! Filled by the loaders; shown by the programs.
 
-use super::load::MODELS_TOLD;
+use super::endings::MODELS_TOLD;
 use std::path::PathBuf;
 
 /// Why a scene cannot be loaded. Every message names the file, the place in it, what was found and what to do.

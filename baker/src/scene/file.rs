@@ -1,12 +1,15 @@
 //! Scene files: their values judged, what they name loaded, all put together.
 //! The text comes from a .toml file; the `Scene` goes to the baker.
 
+use super::alone::{self, BACKGROUND, FOV};
+use super::endings::MODELS_TOLD;
 use super::error::{SceneError, Warnings};
-use super::keys::{CameraTable, File, HeightTable, LightTable, Source};
-use super::load::{self, BACKGROUND, FOV, MAX_FPS, MAX_FRAMES, MAX_SCREEN, MODELS_TOLD, Overrides, PLAYBACK};
+use super::keys::{CameraTable, File, HeightTable, LightTable, LineTable, OrbitTable, PivotTable, Source, SplineTable};
+use super::loader;
 use super::model::Model;
+use super::overrides::{MAX_FPS, MAX_FRAMES, MAX_SCREEN, Overrides, PLAYBACK};
 use super::up::Along;
-use super::{Background, Light, Playback, Scene, Triangle, Wrap, heightfield, picture};
+use super::{Background, Light, Playback, Scene, Triangle, Wrap, builtin, heightfield, picture};
 use crate::camera::{self, Aim, Line, Orbit, Pivot, Spline};
 use glam::{DVec3, Vec3};
 use std::path::{Path, PathBuf};
@@ -24,7 +27,7 @@ pub(crate) fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneErr
     }
     let lights = lights(&source, &file.light)?;
     if let Some(name) = &file.scene.builtin {
-        return builtin(&source, &file, name, lights, overrides);
+        return built_in(&source, &file, name, lights, overrides);
     }
     let playback = overrides.apply(playback(&source, &file, PLAYBACK)?)?;
     let mut model = model(&source, &file, &playback, lights.is_empty(), overrides)?;
@@ -33,10 +36,10 @@ pub(crate) fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneErr
             Some(path) => path,
             None => {
                 let fov = table.fov.unwrap_or(FOV);
-                Arc::new(load::turntable(&model, &playback, fov, table.up.map_or(DVec3::Y, DVec3::from_array)))
+                Arc::new(alone::turntable(&model, &playback, fov, table.up.map_or(DVec3::Y, DVec3::from_array)))
             }
         },
-        None => Arc::new(load::turntable(&model, &playback, FOV, DVec3::Y)),
+        None => Arc::new(alone::turntable(&model, &playback, FOV, DVec3::Y)),
     };
     if file.camera.as_ref().is_some_and(|c| c.gltf.is_some() && c.up.is_some()) {
         model.warnings.add("camera.up is ignored: the model's camera has its own");
@@ -53,7 +56,7 @@ pub(crate) fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneErr
     }
     let background = background(&source, &file, &mut model.warnings)?.unwrap_or(Background::Colour(BACKGROUND));
     Ok(Scene {
-        name: load::name(path),
+        name: alone::name(path),
         triangles: model.triangles,
         materials: model.materials,
         textures: model.textures.into(),
@@ -65,7 +68,7 @@ pub(crate) fn load(path: &Path, overrides: &Overrides) -> Result<Scene, SceneErr
     })
 }
 
-fn builtin(source: &Source<'_>, file: &File, name: &str, lights: Vec<Light>, overrides: &Overrides) -> Result<Scene, SceneError> {
+fn built_in(source: &Source<'_>, file: &File, name: &str, lights: Vec<Light>, overrides: &Overrides) -> Result<Scene, SceneError> {
     for (other, given) in [
         ("model", file.scene.model.is_some()),
         ("heightfield", file.scene.heightfield.is_some()),
@@ -77,8 +80,8 @@ fn builtin(source: &Source<'_>, file: &File, name: &str, lights: Vec<Light>, ove
         }
     }
     overrides.no_model("a built-in scene")?;
-    let mut scene = load::load_builtin(name, &Overrides::default()).map_err(|e| source.error("scene.builtin", e.to_string()))?;
-    scene.name = load::name(source.file);
+    let mut scene = builtin::load_builtin(name, &Overrides::default()).map_err(|e| source.error("scene.builtin", e.to_string()))?;
+    scene.name = alone::name(source.file);
     scene.playback = overrides.apply(playback(source, file, scene.playback)?)?;
     if let Some(table) = &file.camera {
         let own = scene.camera.pose(0.0).fov;
@@ -142,7 +145,7 @@ fn model(source: &Source<'_>, file: &File, playback: &Playback, unlit: bool, ove
                 check_file(source, "scene.texture", texture)?;
             }
             let up = file.scene.up.as_ref().map(|up| up.parse().map_err(|what| source.error("scene.up", what))).transpose()?;
-            load::model(&full, texture.as_deref(), overrides.up.or(up)).unwrap_or_else(|| {
+            loader::model(&full, texture.as_deref(), overrides.up.or(up)).unwrap_or_else(|| {
                 Err(source.error("scene.model", format!("found \"{}\"; expected a {MODELS_TOLD} file: convert the model", path.display())))
             })
         }
@@ -230,54 +233,71 @@ fn path_of(source: &Source<'_>, table: &CameraTable, fov: f64, model: Option<&Mo
     if up.try_normalize().is_none() {
         return Err(source.error("camera.up", format!("found {:?}; expected a direction, such as [0, 1, 0]", up.to_array())));
     }
-    let point = |key: &str, p: &[f64; 3]| finite(source, &format!("camera.{key}"), p).map(|()| DVec3::from_array(*p));
-    if let Some(t) = &table.orbit {
-        if !(t.radius.is_finite() && t.radius > 0.0) {
-            return Err(source.error("camera.orbit.radius", format!("found {}; expected a distance above zero", t.radius)));
-        }
-        angles(source, "camera.orbit", &t.azimuth, &t.elevation)?;
-        let target = point("orbit.target", &t.target)?;
-        return Ok(Some(Arc::new(Orbit { target, radius: t.radius, azimuth: t.azimuth, elevation: t.elevation, up, fov })));
-    }
-    if let Some(t) = &table.line {
-        let aim = match (&t.look, &t.look_at) {
-            (Some(d), None) => Aim::Direction(point("line.look", d)?),
-            (None, Some(p)) => Aim::Point(point("line.look_at", p)?),
-            (Some(_), Some(_)) => {
-                return Err(source.error("camera.line", "has both look and look_at; expected one of them: remove the other"));
-            }
-            (None, None) => return Err(source.error("camera.line", "has neither look nor look_at; expected one of them: add it")),
-        };
-        if let Aim::Direction(DVec3::ZERO) = aim {
-            return Err(source.error("camera.line.look", "found [0, 0, 0]; expected a direction, such as [0, 0, -1]"));
-        }
-        let (from, to) = (point("line.from", &t.from)?, point("line.to", &t.to)?);
-        return Ok(Some(Arc::new(Line { from, to, aim, up, fov })));
-    }
-    if let Some(t) = &table.spline {
-        if t.points.len() < 2 {
-            return Err(source.error("camera.spline.points", format!("found {} points; expected at least 2", t.points.len())));
-        }
-        if t.look_at.is_empty() {
-            return Err(source.error("camera.spline.look_at", "found no points; expected at least 1"));
-        }
-        let points = t.points.iter().map(|p| point("spline.points", p)).collect::<Result<_, _>>()?;
-        let look_at = t.look_at.iter().map(|p| point("spline.look_at", p)).collect::<Result<_, _>>()?;
-        return Ok(Some(Arc::new(Spline { points, look_at, up, fov })));
-    }
-    if let Some(t) = &table.pivot {
-        angles(source, "camera.pivot", &t.azimuth, &t.elevation)?;
-        return Ok(Some(Arc::new(Pivot { eye: point("pivot.eye", &t.eye)?, azimuth: t.azimuth, elevation: t.elevation, up, fov })));
-    }
-    if let Some(name) = &table.gltf {
+    let path: Arc<dyn camera::Path> = if let Some(table) = &table.orbit {
+        Arc::new(orbit(source, table, up, fov)?)
+    } else if let Some(table) = &table.line {
+        Arc::new(line(source, table, up, fov)?)
+    } else if let Some(table) = &table.spline {
+        Arc::new(spline(source, table, up, fov)?)
+    } else if let Some(table) = &table.pivot {
+        Arc::new(pivot(source, table, up, fov)?)
+    } else if let Some(name) = &table.gltf {
         let Some(model) = model else {
             return Err(source.error("camera.gltf", "needs a glTF model; a built-in scene has no named cameras"));
         };
         let mut path = model.camera(name).map_err(|what| source.error("camera.gltf", what))?;
         path.fov = table.fov.unwrap_or(path.fov);
-        return Ok(Some(Arc::new(Along { path, up: model.up })));
+        Arc::new(Along { path, up: model.up })
+    } else {
+        return Ok(None);
+    };
+    Ok(Some(path))
+}
+
+/// The point that `[camera]` has under `key`.
+fn point(source: &Source<'_>, key: &str, p: &[f64; 3]) -> Result<DVec3, SceneError> {
+    finite(source, &format!("camera.{key}"), p).map(|()| DVec3::from_array(*p))
+}
+
+fn orbit(source: &Source<'_>, table: &OrbitTable, up: DVec3, fov: f64) -> Result<Orbit, SceneError> {
+    let &OrbitTable { ref target, radius, azimuth, elevation } = table;
+    if !(radius.is_finite() && radius > 0.0) {
+        return Err(source.error("camera.orbit.radius", format!("found {radius}; expected a distance above zero")));
     }
-    Ok(None)
+    angles(source, "camera.orbit", &azimuth, &elevation)?;
+    Ok(Orbit { target: point(source, "orbit.target", target)?, radius, azimuth, elevation, up, fov })
+}
+
+fn line(source: &Source<'_>, table: &LineTable, up: DVec3, fov: f64) -> Result<Line, SceneError> {
+    let aim = match (&table.look, &table.look_at) {
+        (Some(d), None) => Aim::Direction(point(source, "line.look", d)?),
+        (None, Some(p)) => Aim::Point(point(source, "line.look_at", p)?),
+        (Some(_), Some(_)) => {
+            return Err(source.error("camera.line", "has both look and look_at; expected one of them: remove the other"));
+        }
+        (None, None) => return Err(source.error("camera.line", "has neither look nor look_at; expected one of them: add it")),
+    };
+    if let Aim::Direction(DVec3::ZERO) = aim {
+        return Err(source.error("camera.line.look", "found [0, 0, 0]; expected a direction, such as [0, 0, -1]"));
+    }
+    let (from, to) = (point(source, "line.from", &table.from)?, point(source, "line.to", &table.to)?);
+    Ok(Line { from, to, aim, up, fov })
+}
+
+fn spline(source: &Source<'_>, table: &SplineTable, up: DVec3, fov: f64) -> Result<Spline, SceneError> {
+    if table.points.len() < 2 {
+        return Err(source.error("camera.spline.points", format!("found {} points; expected at least 2", table.points.len())));
+    }
+    if table.look_at.is_empty() {
+        return Err(source.error("camera.spline.look_at", "found no points; expected at least 1"));
+    }
+    let points = |key, points: &[[f64; 3]]| points.iter().map(|p| point(source, key, p)).collect::<Result<_, _>>();
+    Ok(Spline { points: points("spline.points", &table.points)?, look_at: points("spline.look_at", &table.look_at)?, up, fov })
+}
+
+fn pivot(source: &Source<'_>, table: &PivotTable, up: DVec3, fov: f64) -> Result<Pivot, SceneError> {
+    angles(source, "camera.pivot", &table.azimuth, &table.elevation)?;
+    Ok(Pivot { eye: point(source, "pivot.eye", &table.eye)?, azimuth: table.azimuth, elevation: table.elevation, up, fov })
 }
 
 fn angles(source: &Source<'_>, key: &str, azimuth: &[f64; 2], elevation: &[f64; 2]) -> Result<(), SceneError> {

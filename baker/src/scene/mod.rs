@@ -1,16 +1,20 @@
 //! A scene in memory: world-space triangles, materials, textures, lights, a camera path, playback.
 //! Every loader ends here; everything after it starts here.
 
+mod alone;
 pub mod builtin;
+mod endings;
 mod error;
 mod file;
 mod gltf;
 mod heightfield;
 mod keys;
 mod load;
+mod loader;
 mod model;
 mod mtl;
 mod obj;
+mod overrides;
 mod picture;
 mod ply;
 mod polygon;
@@ -19,8 +23,11 @@ mod stl;
 mod turned;
 mod up;
 
+pub use builtin::load_builtin;
+pub use endings::MODELS;
 pub use error::SceneError;
-pub use load::{MODELS, Overrides, load, load_builtin};
+pub use load::load;
+pub use overrides::Overrides;
 pub(crate) use split::split;
 pub use turned::turned;
 pub use up::Up;

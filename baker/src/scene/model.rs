@@ -1,5 +1,5 @@
 //! What a model's loader hands over: triangles in world space and how they look; and the last checks on them.
-//! Filled by the loaders of glTF, OBJ, PLY, STL and heightfields; goes to `load` and `file`.
+//! Filled by the loaders of glTF, OBJ, PLY, STL and heightfields; goes to `alone` and `file`.
 
 use super::error::Warnings;
 use super::{Material, Texture, Triangle, Up};

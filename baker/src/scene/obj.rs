@@ -1,5 +1,5 @@
 //! Wavefront OBJ and its MTL files, through `tobj`, after a pass over the text that says in which line something is wrong.
-//! Files come from `load`; models go back there.
+//! Files come from `loader`; models go back there.
 
 use super::error::Warnings;
 use super::model::{MAX_TRIANGLES, Model, too_many};

@@ -1,5 +1,5 @@
 //! PLY, ASCII or binary of either byte order, with vertex colours, through `ply-rs-bw`.
-//! Files come from `load`; models go back there.
+//! Files come from `loader`; models go back there.
 
 use super::model::{MAX_TRIANGLES, Model, too_many};
 use super::{Material, Triangle, Wrap, picture, polygon};
@@ -166,10 +166,20 @@ fn model(bytes: &[u8], folder: &Path, fallback: Option<&Path>) -> Result<Model, 
             vertices.len()
         ));
     }
+    look(&mut model, &header, folder, fallback)?;
+    if let Some(i) = vertices.iter().position(|v| !v.position.is_finite() || !v.uv.is_finite() || !v.colour.is_finite()) {
+        return Err(format!("vertex {i}: a number is infinite or none; expected numbers"));
+    }
+    surface(&mut model, &vertices, &faces, &strips)?;
+    Ok(model)
+}
+
+/// What a file says about colours and its texture; `fallback` serves a file that names none.
+fn look(model: &mut Model, header: &Header, folder: &Path, fallback: Option<&Path>) -> Result<(), String> {
+    const RED: [&str; 3] = ["red", "r", "diffuse_red"];
     let has_of =
         |element: &str, names: &[&str]| header.elements.get(element).is_some_and(|e| names.iter().any(|n| e.properties.contains_key(*n)));
     let has = |names: &[&str]| has_of("vertex", names);
-    const RED: [&str; 3] = ["red", "r", "diffuse_red"];
     model.coloured = has(&RED);
     if has_of("face", &RED) {
         model.warnings.add("the colours of faces are not shown: only those of vertices are");
@@ -189,9 +199,11 @@ fn model(bytes: &[u8], folder: &Path, fallback: Option<&Path>) -> Result<Model, 
         }
     }
     model.materials.push(material);
-    if let Some(i) = vertices.iter().position(|v| !v.position.is_finite() || !v.uv.is_finite() || !v.colour.is_finite()) {
-        return Err(format!("vertex {i}: a number is infinite or none; expected numbers"));
-    }
+    Ok(())
+}
+
+/// The triangles of faces and strips.
+fn surface(model: &mut Model, vertices: &[Vertex], faces: &[Face], strips: &[Face]) -> Result<(), String> {
     for (i, face) in faces.iter().enumerate() {
         let corners = indices(&face.corners, vertices.len()).map_err(|e| format!("face {i}: {e}"))?;
         if corners.len() < 3 {
@@ -199,23 +211,23 @@ fn model(bytes: &[u8], folder: &Path, fallback: Option<&Path>) -> Result<Model, 
         }
         // Most faces are triangles.
         if let &[a, b, c] = &corners[..] {
-            push(&mut model, [a, b, c], &vertices)?;
+            push(model, [a, b, c], vertices)?;
             continue;
         }
         let positions: Vec<DVec3> = corners.iter().map(|&corner| vertices[corner].position).collect();
         for triangle in polygon::triangles(&positions) {
-            push(&mut model, triangle.map(|at| corners[at]), &vertices)?;
+            push(model, triangle.map(|at| corners[at]), vertices)?;
         }
     }
     for (i, strip) in strips.iter().enumerate() {
         for run in strip.corners.split(|c| *c < 0) {
             let corners = indices(run, vertices.len()).map_err(|e| format!("tristrips {i}: {e}"))?;
             for (k, w) in corners.windows(3).enumerate() {
-                push(&mut model, if k % 2 == 0 { [w[0], w[1], w[2]] } else { [w[0], w[2], w[1]] }, &vertices)?;
+                push(model, if k % 2 == 0 { [w[0], w[1], w[2]] } else { [w[0], w[2], w[1]] }, vertices)?;
             }
         }
     }
-    Ok(model)
+    Ok(())
 }
 
 fn indices(corners: &[i64], count: usize) -> Result<Vec<usize>, String> {

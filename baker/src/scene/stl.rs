@@ -1,5 +1,5 @@
 //! STL, binary or text, through `stl_io`. It knows triangles alone: no colours, no smooth normals, no units.
-//! Files come from `load`; models go back there.
+//! Files come from `loader`; models go back there.
 
 use super::model::{MAX_TRIANGLES, Model, too_many};
 use super::{Material, Triangle};

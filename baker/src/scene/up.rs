@@ -1,5 +1,5 @@
 //! Models that stand another way up than the world: which of their axes points up, and turning them until it does.
-//! Called by `load` once a model is read.
+//! Called by `loader` once a model is read.
 
 use crate::camera::{Path, Pose};
 use glam::{DVec3, Vec3};

@@ -100,9 +100,10 @@ pub fn imports(code: &str, from: &str) -> Vec<String> {
     code.split(from).skip(1).flat_map(first_names).collect()
 }
 
-/// The pairs (name, module) of every `pub use module::name` and `pub use module::{names}` in `code`.
+/// The pairs (name, module) of every `pub use module::name` and `pub use module::{names}` in `code`, within the crate alone, too.
 #[must_use]
 pub fn reexports(code: &str) -> Vec<(String, String)> {
+    let code = code.replace("pub(crate) use ", "pub use ");
     let uses = code.split("pub use ").skip(1).filter_map(|rest| rest.split_once("::"));
     uses.flat_map(|(module, rest)| first_names(rest).into_iter().map(move |name| (name, module.to_owned()))).collect()
 }

@@ -34,6 +34,8 @@ mod torus;
 mod wing;
 
 use super::Scene;
+use super::error::{SceneError, nearest};
+use super::overrides::Overrides;
 
 /// The names that [`build`] knows.
 pub const NAMES: &[&str] = &[
@@ -69,4 +71,19 @@ pub fn build(name: &str) -> Option<Scene> {
         "mirrors" => mirrors::build(),
         _ => return None,
     })
+}
+
+/// Builds the built-in scene `name`, one of [`NAMES`], with `overrides` over its playback.
+///
+/// # Errors
+/// An unknown name, or an override out of range.
+pub fn load_builtin(name: &str, overrides: &Overrides) -> Result<Scene, SceneError> {
+    overrides.no_model("a built-in scene")?;
+    let mut scene = build(name).ok_or_else(|| SceneError::Builtin {
+        name: name.to_owned(),
+        near: nearest(name, NAMES.iter().copied()).map(str::to_owned),
+        names: NAMES.join(", "),
+    })?;
+    scene.playback = overrides.apply(scene.playback)?;
+    Ok(scene)
 }

@@ -1,6 +1,6 @@
 //! glTF 2.0, .gltf and .glb: the only folder that names the `gltf` crate, and of it only the document's types.
 //! Every index, offset and length is checked here before it is used, hence none of the crate's own readers.
-//! Files come from `load`; models go back there.
+//! Files come from `loader`; models go back there.
 
 mod accessor;
 mod buffers;

@@ -1,5 +1,5 @@
 //! TIFF heights, striped or tiled, of any number type, with GDAL's nodata.
-//! Bytes come from `grid`; the grid goes back there.
+//! Bytes come from `read`; the grid goes back there.
 
 use super::grid::{Grid, MAX_POSTS};
 use crate::scene::error::Warnings;

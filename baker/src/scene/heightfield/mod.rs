@@ -1,8 +1,9 @@
 //! Heightfields: a grid of heights, thinned to what the screen can show, as a triangle mesh with smooth normals.
-//! Grids come from `grid`, colours from a picture; models go to `file`.
+//! Grids come from `read`, colours from a picture; models go to `file`.
 
 mod geotiff;
 mod grid;
+mod read;
 
 use super::error::SceneError;
 use super::model::Model;
@@ -35,7 +36,7 @@ pub(crate) fn load(field: &Field<'_>, screen: &Playback, unlit: bool) -> Result<
         move |what| SceneError::Model { file, what }
     };
     let mut model = Model::default();
-    let mut grid = grid::load(field.heights, &mut model.warnings).map_err(error(field.heights))?;
+    let mut grid = read::load(field.heights, &mut model.warnings).map_err(error(field.heights))?;
     let (low, high) = grid.extremes().ok_or_else(|| error(field.heights)("every post is nodata: nothing to show".to_owned()))?;
     // 1.6 posts a pixel of the longer side: more would be thinner than a pixel wherever the whole field is in view.
     let most = (screen.width.max(screen.height) * 8 / 5).clamp(256, 1024);
