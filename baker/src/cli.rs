@@ -210,7 +210,7 @@ pub struct Bake {
     /// Writes bytes, seconds, quality and warnings as JSON.
     #[arg(long, value_name = "FILE.json")]
     pub report: Option<PathBuf>,
-    /// Writes pictures of the source image, and of three frames and the worst one.
+    /// Writes pictures of the source image, and of three frames and the worst one; an earlier bake's there go.
     ///
     /// source-image.png: with the charts' borders; mask.png: its covered texels; never-seen.png: covered texels that no pixel of any frame falls
     /// on, in magenta; density.png: texels a pixel where a surface is seen closest, over what was asked for, from a quarter (blue: too coarse)
