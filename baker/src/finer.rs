@@ -9,7 +9,8 @@
 //! |---|---|---|---|
 //! | many | steady, or cells are large | cells half as large with keys twice as far apart | shows more for the bytes |
 //! | | | else keys twice as far apart | shows as much for fewer bytes |
-//! | many | in between | keys twice as far apart | the same |
+//! | | | else closer ones | outlines may turn though surfaces go straight on |
+//! | many | in between | keys twice as far apart, else closer ones | the same |
 //! | many | bend | nothing | |
 //! | few | steady | keys twice as far apart, and again | the same |
 //! | | | else closer ones | outlines may turn though surfaces go straight on |
@@ -82,10 +83,11 @@ impl Other {
         } else {
             ""
         };
-        // Either alone keeps both as they are usually.
+        // Either alone keeps both as they are usually, which is no advice where nothing speaks for it.
         let way = if cell == made.settings.cell { format!("--key-interval {key_interval}") } else { format!("--cell {cell}") };
+        let wanted = if usual.beaten(made) { String::new() } else { format!(": give {way} for that") };
         format!(
-            "{why}: --cell {} --key-interval {} are used, {}; with {cell} and {key_interval} it would be {}{seen}: give {way} for that",
+            "{why}: --cell {} --key-interval {} are used, {}; with {cell} and {key_interval} it would be {}{seen}{wanted}",
             made.settings.cell,
             made.settings.key_interval,
             made.told(),
@@ -131,10 +133,10 @@ fn climbs(cell: u32, quality: &Brief, brief: bool) -> Option<(&'static [Climb], 
     let climbs: &[Climb] = match torn {
         true if (bent < STEADY || cell > USUAL) && brief => &[FINER, FARTHER, FASTEST],
         true if (bent < STEADY || cell > USUAL) && passing(quality) => &[FASTER, FINER, FARTHER],
-        true if bent < STEADY || cell > USUAL => &[FINER, FARTHER],
+        true if bent < STEADY || cell > USUAL => &[FINER, FARTHER, CLOSE],
         true if bent < BENT && brief => &[FARTHER, FASTEST],
         true if bent < BENT && passing(quality) => &[FASTER, FARTHER],
-        true if bent < BENT => &[FARTHER],
+        true if bent < BENT => &[FARTHER, CLOSE],
         true if brief => &[FASTEST],
         true if passing(quality) => &[FASTER],
         false if bent >= BENT => &[CLOSER],
@@ -425,10 +427,10 @@ mod tests {
         };
         let tried = |cell, wrong_surface_percent, p99| of(cell, wrong_surface_percent, p99, false);
         // Torn and steady, torn and not quite so, both torn and bent, the last in large cells; bent; neither; steady.
-        assert_eq!([tried(8, 2.0, 0.9), tried(8, 2.0, 1.0), tried(8, 2.0, 2.0)], [Some((2, "many")), Some((1, "many")), None]);
+        assert_eq!([tried(8, 2.0, 0.9), tried(8, 2.0, 1.0), tried(8, 2.0, 2.0)], [Some((3, "many")), Some((2, "many")), None]);
         assert_eq!(
             [tried(16, 2.0, 2.0), tried(8, 1.9, 2.0), tried(8, 1.9, 1.9)],
-            [Some((2, "many")), Some((1, "surfaces")), Some((1, "surfaces"))]
+            [Some((3, "many")), Some((1, "surfaces")), Some((1, "surfaces"))]
         );
         assert_eq!(tried(8, 1.9, 0.9), Some((2, "surfaces")));
         // So fast that outlines are no matter.

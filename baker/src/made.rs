@@ -55,6 +55,13 @@ impl Made {
         metrics::worth(self.quality.psnr_mean, self.encoded.bundle.len().saturating_sub(picture) as u64, DOUBLE)
     }
 
+    /// Whether `other` is better than it, and smaller in flash and in memory.
+    pub fn beaten(&self, other: &Self) -> bool {
+        let memory = |made: &Self| verify::memory(&made.encoded.bundle).unwrap_or(0);
+        let (bytes, psnr) = (|made: &Self| made.encoded.bundle.len(), |made: &Self| made.quality.psnr_mean);
+        bytes(other) <= bytes(self) && memory(other) <= memory(self) && psnr(other) >= psnr(self)
+    }
+
     /// What it is in the words of a warning.
     pub fn told(&self) -> String {
         let Self { encoded: Encoded { bundle, .. }, quality, .. } = self;

@@ -3,6 +3,8 @@
 
 /// The PSNR of a picture without any error, dB: a number, so that means stay numbers.
 pub const PERFECT: f64 = 99.0;
+/// The PSNR that a frame counts in a mean at most, dB: about what rounding to eight bits leaves.
+const FINE: f64 = 60.0;
 /// Side of an SSIM window, pixels.
 const WINDOW: usize = 8;
 /// SSIM's two stabilising constants: (0.01 * 255)^2 and (0.03 * 255)^2.
@@ -12,6 +14,18 @@ const STABLE: [f64; 2] = [6.5025, 58.5225];
 #[must_use]
 pub fn psnr(mse: f64) -> f64 {
     if mse <= 0.0 { PERFECT } else { (10.0 * libm::log10(255.0 * 255.0 / mse)).min(PERFECT) }
+}
+
+/// The mean PSNR of frames of these, dB: of those with an error, for frames of nothing but background tell nothing of a bundle, and one frame of a sliver of
+/// something as little; [`PERFECT`] where none has any.
+#[must_use]
+pub fn mean_psnr(frames: impl IntoIterator<Item = f64>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0u32);
+    for psnr in frames.into_iter().filter(|&psnr| psnr < PERFECT) {
+        sum += psnr.min(FINE);
+        count += 1;
+    }
+    if count == 0 { PERFECT } else { sum / f64::from(count) }
 }
 
 /// The mean squared error of a picture of `psnr` dB.
@@ -143,6 +157,9 @@ mod tests {
     fn psnr_of_known_errors() {
         assert_eq!(psnr(0.0), PERFECT);
         assert_eq!(psnr(1e-9), PERFECT);
+        assert_eq!(mean_psnr([PERFECT, 30.0, PERFECT, 40.0]), 35.0);
+        assert_eq!(mean_psnr([90.0, 30.0]), 45.0);
+        assert_eq!([mean_psnr([PERFECT; 2]), mean_psnr([])], [PERFECT; 2]);
         assert_eq!(psnr(255.0 * 255.0), 0.0);
         // Every component one off: 20 log10(255).
         let (a, b) = (vec![10u8; 300], vec![11u8; 300]);

@@ -37,14 +37,12 @@ impl Samples {
 
     /// The mean squared error and the mean PSNR, dB, of a bundle.
     pub(crate) fn of_bundle(&self, bundle: &[u8]) -> Result<(f64, f64), BakeError> {
-        let (mut error, mut psnr, mut truth) = (0.0, 0.0, self.pictures.iter());
+        let (mut errors, mut truth) = (Vec::new(), self.pictures.iter());
         verify::play(bundle, &self.frames, |_, played| {
-            let now = truth.next().map_or(0.0, |truth| metrics::mean_squared_error(played, truth));
-            error += now;
-            psnr += metrics::psnr(now);
+            errors.push(truth.next().map_or(0.0, |truth| metrics::mean_squared_error(played, truth)));
         })?;
-        let count = self.frames.len().max(1) as f64;
-        Ok((error / count, psnr / count))
+        let psnr = metrics::mean_psnr(errors.iter().map(|&error| metrics::psnr(error)));
+        Ok((errors.iter().sum::<f64>() / errors.len().max(1) as f64, psnr))
     }
 }
 

@@ -55,7 +55,7 @@ pub struct PathError {
 /// Playback against exact ray casting of every pixel of every frame through the same source image.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Quality {
-    /// Mean of the frames' PSNR, dB; a frame without any error counts [`metrics::PERFECT`].
+    /// Mean of the frames' PSNR, dB, as [`metrics::mean_psnr`] has it.
     pub psnr_mean: f64,
     /// The worst frame's, dB.
     pub psnr_min: f64,
@@ -334,15 +334,14 @@ fn compare(
     let mut path = Histogram::default();
     runs.iter().for_each(|run| path.merge(&run.path));
     let listed = |list: fn(&Sums) -> &Vec<f64>| runs.iter().flat_map(list).copied();
-    let mean = |list: fn(&Sums) -> &Vec<f64>| listed(list).sum::<f64>() / f64::from(gbuffer.frames.max(1));
     let (worst_frame, psnr_min) = (0..).zip(listed(|run| &run.psnr)).min_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, metrics::PERFECT));
     let wrong: u64 = runs.iter().map(|run| run.wrong).sum();
     Ok(Quality {
-        psnr_mean: mean(|run| &run.psnr),
+        psnr_mean: metrics::mean_psnr(listed(|run| &run.psnr)),
         psnr_min,
         worst_frame,
-        ssim_mean: mean(|run| &run.ssim),
-        psnr_bilinear: mean(|run| &run.bilinear),
+        ssim_mean: listed(|run| &run.ssim).sum::<f64>() / f64::from(gbuffer.frames.max(1)),
+        psnr_bilinear: if all { metrics::mean_psnr(listed(|run| &run.bilinear)) } else { 0.0 },
         wrong_surface_percent: 100.0 * wrong as f64 / gbuffer.label.len().max(1) as f64,
         path_error_texels: PathError { p50: path.percentile(0.5), p99: path.percentile(0.99), max: path.max() },
     })
@@ -420,15 +419,10 @@ pub fn against_truth(
         (plain, others, ssim)
     };
     let all = in_runs(&bundle, frames, |screen, &frame| compared(screen, frame))?;
-    let count = all.len().max(1) as f64;
-    let (mut psnr_mean, mut others, mut ssim_mean) = (0.0, [0.0; 4], 0.0);
-    for (plain, ways, ssim) in all {
-        psnr_mean += plain;
-        others.iter_mut().zip(ways).for_each(|(sum, psnr)| *sum += psnr);
-        ssim_mean += ssim;
-    }
-    let [psnr_smooth, psnr_dithered, psnr_bilinear, psnr_fine] = others.map(|sum| sum / count);
-    let (psnr_mean, ssim_mean) = (psnr_mean / count, ssim_mean / count);
+    let psnr_mean = metrics::mean_psnr(all.iter().map(|&(plain, ..)| plain));
+    let [psnr_smooth, psnr_dithered, psnr_bilinear, psnr_fine] =
+        [0, 1, 2, 3].map(|way| metrics::mean_psnr(all.iter().map(|(_, ways, _)| ways[way])));
+    let ssim_mean = all.iter().map(|&(.., ssim)| ssim).sum::<f64>() / all.len().max(1) as f64;
     Ok(TruthQuality { psnr_mean, psnr_smooth, psnr_dithered, psnr_bilinear, psnr_fine, ssim_mean, truth_frames: frames.len() as u32 })
 }
 
@@ -443,7 +437,7 @@ pub(crate) fn against_pictures(bytes: &[u8], pictures: &[(u32, Vec<u8>)]) -> Res
         screen.play(*frame, &mut played);
         metrics::psnr(metrics::mean_squared_error(&played, exact))
     })?;
-    Ok(all.iter().sum::<f64>() / all.len().max(1) as f64)
+    Ok(metrics::mean_psnr(all))
 }
 
 /// Bytes of working memory that a player of a bundle asks for.

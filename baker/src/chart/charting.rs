@@ -35,6 +35,8 @@ pub struct Chart {
     pub finest: f64,
     /// What texels an octave too long cost a pixel that shows it, on the whole: 1 where its colour is then eight levels of 255 off.
     pub loss: f64,
+    /// How much longer than a source image it would be as fine as is worth its bytes; below 1 where that fits.
+    pub wanted: f64,
     /// Smallest flattened coordinates that are seen.
     pub lo: [f64; 2],
     /// Largest flattened coordinates that are seen.
@@ -46,7 +48,7 @@ pub struct Chart {
 impl Chart {
     /// One that is not measured yet: of nothing seen, as fine as it gets.
     pub(crate) const fn new(projection: Projection, density: f64) -> Self {
-        Self { projection, density, finest: density, loss: 1.0, lo: [0.0; 2], hi: [0.0; 2], hits: 0 }
+        Self { projection, density, finest: density, loss: 1.0, wanted: 0.0, lo: [0.0; 2], hi: [0.0; 2], hits: 0 }
     }
 }
 

@@ -188,6 +188,7 @@ fn settle(chart: &mut Chart, figures: &Figures, turns: &[[f64; 2]; TURNS], densi
     chart.lo = [-figures.reach[TURNS + k], -figures.reach[TURNS + l]];
     chart.hi = [figures.reach[k], figures.reach[l]];
     let longest = side(k).max(side(l)).max(f64::MIN_POSITIVE);
+    chart.wanted = densities[0] * longest / f64::from(max_side);
     // A plane that runs from the camera to the horizon would fill any image.
     [chart.density, chart.finest] = densities.map(|density| density.min(f64::from(max_side) / longest).max(1e-9));
 }

@@ -13,6 +13,7 @@ mod flat;
 mod fold;
 mod islands;
 mod labels;
+mod long;
 mod measure;
 mod merge;
 mod observe;
@@ -42,6 +43,9 @@ pub(crate) use warp::rewarp;
 
 /// What takes the place of depth where there is no projection: two surfaces that lie on each other in a texture are seldom level in it.
 const OBLIQUE: DVec3 = DVec3::new(0.48, 0.64, 0.6);
+
+/// Times that long charts are cut in two, at most.
+const CUTS: usize = 5;
 
 /// How the faces are shared out among charts: what a cut changes.
 pub(crate) struct Parts {
@@ -172,6 +176,12 @@ pub fn build(scene: &Scene, hits: &Hits, family: Family, density: &Density, max_
     charting.flatten(scene);
     let (folded, parted) = (fold::split(hits, &mut charting, &links), apart::split(scene, hits, &mut charting, &links));
     if folded || parted {
+        measure::measure(scene, hits, seen.as_ref(), &mut charting, density, max_side);
+    }
+    for _ in 0..CUTS {
+        if !long::split(&mut charting) {
+            break;
+        }
         measure::measure(scene, hits, seen.as_ref(), &mut charting, density, max_side);
     }
     charting

@@ -13,12 +13,15 @@ const LOST_PERCENT: f64 = 25.0;
 
 /// What the scene's loader warned of, and the pipeline itself.
 pub(super) fn of(origin: &Origin<'_>, quality: &Quality) -> Vec<String> {
-    let own = [surfaces(origin), source_image(origin), shared_labels(origin), crossed(origin), still(origin)].into_iter().flatten();
+    let own =
+        [surfaces(origin, quality.wrong_surface_percent), source_image(origin), shared_labels(origin), crossed(origin), still(origin)]
+            .into_iter()
+            .flatten();
     origin.scene.warnings.iter().cloned().chain(own).chain(missing(quality, closest(origin))).collect()
 }
 
 /// Surfaces that are not shown, because they are too small on the screen.
-fn surfaces(origin: &Origin<'_>) -> Option<String> {
+fn surfaces(origin: &Origin<'_>, wrong: f64) -> Option<String> {
     let Origin { flat, encoded, settings, .. } = origin;
     let (cell, interval) = (settings.cell, closest(origin));
     let share = |of: u64| 100.0 * encoded.dropped_pixels as f64 / of.max(1) as f64;
@@ -36,10 +39,12 @@ fn surfaces(origin: &Origin<'_>) -> Option<String> {
         true => (", or that are not worth their bytes there", format!("--sheets all keeps more of them; {cure}")),
         false => ("", cure.to_owned()),
     };
+    // What else is wrong is outlines that keys and cells do not follow.
+    let all = if wrong > 1.5 * dropped { format!(" ({wrong:.2} % show a wrong surface in all)") } else { String::new() };
     (dropped > DROPPED_PERCENT).then(|| {
         format!(
-            "{dropped:.2} % of the pixels show a neighbour instead of their own surface; a cell of {cell} x {cell} pixels x {interval} frames leaves out \
-             surfaces that cover too little of it{or}; {cure}"
+            "{dropped:.2} % of the pixels show a neighbour because their own surface is left out{all}: a cell of {cell} x {cell} pixels x {interval} frames \
+             leaves out what covers too little of it{or}; {cure}"
         )
     })
 }
