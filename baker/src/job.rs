@@ -138,9 +138,9 @@ fn once(tracer: &Tracer<'_>, options: &Options, whole: Option<Whole>, progress: 
         verify: verify_start.elapsed().as_secs_f64(),
         search: search_seconds,
     };
-    let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings, spaces, bends, outlines, repainted };
+    let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings, spaces, bends, why, outlines, repainted };
     let mut report = Report::new(&origin, &inspection, quality, truth, work, seconds);
-    report.warnings.extend(warnings.into_iter().chain(why));
+    report.warnings.extend(warnings);
     Ok(Baked { bundle: encoded.bundle, report, flat, settings, psnr_before, contested })
 }
 

@@ -95,7 +95,12 @@ fn memory_is_kept_to_or_what_it_takes_is_said() {
     let dir = folder();
     refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--ram", "1K"]), 1, "--ram: expected room for ");
     refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--ram", "1K", "--time", "cubic"]), 1, "or leave --time to the search");
-    refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--ram", "1K", "--budget", "9K"]), 2, "cannot be used with");
+    refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--psnr", "30", "--budget", "9K"]), 2, "cannot be used with");
+    refused(
+        &bake(dir.path(), "a.obj", &["-o", "a.cubist", "--ram", "1K", "--budget", "9K"]),
+        1,
+        "--budget and --ram: expected a bundle of",
+    );
     for (option, wanted) in [("--ram", "a number of bytes"), ("--budget", "a number of bytes"), ("--psnr", "expected")] {
         refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", option, "-5"]), 2, wanted);
     }

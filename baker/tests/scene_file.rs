@@ -67,6 +67,8 @@ fn every_kind_of_path() {
     let spline = path("spline = { points = [[0, 0, 9], [4, 0, 0], [0, 0, -9]], look_at = [[0, 0, 0], [0, 1, 0]] }");
     assert_eq!(spline.pose(0.5).eye, DVec3::new(4.0, 0.0, 0.0));
     assert_eq!(spline.pose(1.0).eye, DVec3::new(0.0, 0.0, -9.0));
+    let still = path("spline = { points = [[0, 0, 9], [0, 0, 5]], look_at = [0, 0, 0] }");
+    assert_eq!(still.pose(1.0).forward, DVec3::NEG_Z);
     let pivot = path("pivot = { eye = [0, 2, 0], azimuth = [0, 90] }\nup = [1, 0, 0]");
     assert_eq!((pivot.pose(0.0).forward, pivot.pose(0.0).up), (DVec3::Z, DVec3::X));
     assert_eq!(path("fov = 30").pose(0.0).fov, 30.0);

@@ -62,11 +62,14 @@ pub struct Grid {
     /// How surfaces bend, where that alone told the space.
     #[serde(default)]
     pub bends: Option<Bends>,
+    /// Why cells and intervals are not the usual ones, what these would come to, and how to have them.
+    #[serde(default)]
+    pub why: Option<String>,
 }
 
 impl Grid {
     fn of(origin: &Origin<'_>) -> Self {
-        let Origin { encoded, settings, spaces, bends, .. } = origin;
+        let Origin { encoded, settings, spaces, bends, why, .. } = origin;
         Self {
             cell: settings.cell,
             key_interval: settings.key_interval,
@@ -75,6 +78,7 @@ impl Grid {
             space: space_name(settings.space).to_owned(),
             spaces: spaces.clone(),
             bends: bends.filter(|&bends| spaces.is_empty() && (bends == Bends::Rough) == (settings.space == SPACE_LINEAR)),
+            why: why.clone(),
         }
     }
 }

@@ -17,6 +17,8 @@ pub(crate) struct Origin<'a> {
     pub spaces: Vec<straight::Trial>,
     /// How surfaces bend, where that tells anything.
     pub bends: Option<Bends>,
+    /// Why it has other cells or intervals than usual.
+    pub why: Option<String>,
     /// Outlines that were tried.
     pub outlines: Vec<outlines::Trial>,
     /// Texels were coloured by the pixels that show them.

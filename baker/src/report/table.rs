@@ -41,6 +41,9 @@ fn tell_scene(report: &Report, rows: &mut Rows) {
         _ => format!("{key_interval} frames"),
     };
     rows.add("grid", format!("{keys} keys, one every {every}; cells of {cell} pixels; time {time}, space {space}"));
+    if let Some(why) = &report.grid.why {
+        rows.add("", why.clone());
+    }
     if !report.grid.spaces.is_empty() {
         rows.add("", straight::reason(&report.grid.spaces));
     }

@@ -36,7 +36,7 @@ fn surfaces(origin: &Origin<'_>, wrong: f64) -> Option<String> {
     }
     let cure = finer(cell, interval);
     let (or, cure) = match settings.error > 0.0 {
-        true => (", or that are not worth their bytes there", format!("--sheets all keeps more of them; {cure}")),
+        true => (", or is not worth its bytes there", format!("--sheets all keeps more of them; {cure}")),
         false => ("", cure.to_owned()),
     };
     // What else is wrong is outlines that keys and cells do not follow.

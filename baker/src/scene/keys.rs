@@ -93,7 +93,7 @@ pub(crate) struct LineTable {
 pub(crate) struct SplineTable {
     #[serde(deserialize_with = "lists")]
     pub points: Vec<[f64; 3]>,
-    #[serde(deserialize_with = "lists")]
+    #[serde(deserialize_with = "points")]
     pub look_at: Vec<[f64; 3]>,
 }
 
@@ -168,6 +168,21 @@ fn maybe<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(deseria
 
 fn lists<'de, D: Deserializer<'de>, T: Deserialize<'de>, const N: usize>(deserializer: D) -> Result<Vec<[T; N]>, D::Error> {
     Ok(Vec::deserialize(deserializer)?.into_iter().map(|List(values)| values).collect())
+}
+
+/// A list of points, or one alone.
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "expected a point, such as [0, 1, 0], or a list of points, such as [[0, 1, 0], [2, 1, 0]]")]
+enum Points {
+    One([f64; 3]),
+    Many(Vec<[f64; 3]>),
+}
+
+fn points<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[f64; 3]>, D::Error> {
+    Ok(match Points::deserialize(deserializer)? {
+        Points::One(point) => vec![point],
+        Points::Many(points) => points,
+    })
 }
 
 fn full_circle() -> [f64; 2] {
