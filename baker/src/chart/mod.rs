@@ -178,7 +178,8 @@ pub fn build(scene: &Scene, hits: &Hits, family: Family, density: &Density, max_
     if folded || parted {
         measure::measure(scene, hits, seen.as_ref(), &mut charting, density, max_side);
     }
-    for _ in 0..CUTS {
+    // Where nothing is said of what texels are worth, a plane that runs to the horizon wants any number of them.
+    for _ in 0..if seen.is_some() { CUTS } else { 0 } {
         if !long::split(&mut charting) {
             break;
         }
