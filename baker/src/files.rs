@@ -34,6 +34,7 @@ impl Begun {
             Ok(()) => self.folders.push(folder.to_owned()),
             // Somebody else was quicker.
             Err(_) if folder.is_dir() => {}
+            Err(_) if folder.exists() => return Err(std::io::Error::other("expected a folder, found a file; name another one")),
             Err(error) => return Err(error),
         }
         Ok(())
@@ -339,6 +340,7 @@ mod tests {
         std::fs::write(&file, "x").unwrap();
         let error = write_png(&file.join("a.png"), 1, &[0; 3]).unwrap_err();
         assert!(error.to_string().contains("plain: the folder cannot be made"), "{error:#}");
+        assert!(format!("{error:#}").ends_with("found a file; name another one"), "{error:#}");
         let error = check(dir.path()).unwrap_err();
         assert!(error.to_string().contains("found a folder"), "{error:#}");
         check(&dir.path().join("new.bin")).unwrap();
