@@ -248,6 +248,7 @@ fn choice(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Res
             Ok(Choice { rewarped: options.rewarp.unwrap_or(choice.rewarped), ..choice })
         }
         None if chart::brings_own(scene) => Ok(Choice { rewarped, ..Family::Own.into() }),
+        None if options.quick => Ok(Choice { rewarped, ..Family::Planes.into() }),
         None => {
             let mut settings = options.settings(scene.playback.width);
             if options.key_interval.is_none() {
@@ -265,6 +266,25 @@ fn choice(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Res
 mod tests {
     use super::*;
     use crate::scene::builtin;
+
+    #[test]
+    fn a_first_look_tries_nothing() {
+        let mut scene = builtin::build("round-columns").unwrap();
+        (scene.playback.width, scene.playback.height, scene.playback.frames) = (64, 48, 9);
+        // Charts are tried where the scene brings none.
+        scene.triangles.iter_mut().for_each(|triangle| triangle.island = None);
+        let options = Options { truth: TruthFrames::None, ..Options::default() };
+        let of = |options| run(&scene, &options, &|_, _| {}).unwrap().report;
+        let (quick, usual) = (of(options.quick()), of(options));
+        let tried = |report: &Report| {
+            let image = &report.source_image;
+            (report.grid.spaces.len(), image.outlines.len(), image.trials.iter().count(), report.grid.why.is_some())
+        };
+        assert_eq!(tried(&quick), (0, 0, 0, false));
+        assert_ne!(tried(&usual), tried(&quick));
+        let wanted = Options { key_interval: Some(2), ..options }.quick();
+        assert_eq!((of(wanted).grid.key_interval, quick.grid.key_interval), (2, 4));
+    }
 
     #[test]
     fn more_pixels_than_can_be_numbered_are_refused() {

@@ -3,11 +3,15 @@
 use crate::atlas::{self, Storage};
 use crate::bake::{Settings, Sparing};
 use crate::chart::Choice;
+use cubist_core::format::SPACE_CUBIC;
 
 /// Screens wider than this get cells of 16 pixels unless told otherwise,
 const WIDE: u32 = 640;
 /// and of 32: of smaller ones there are more than a bundle holds.
 const VAST: u32 = 2560;
+
+/// Frames between keys where nothing is tried.
+const QUICK_INTERVAL: u32 = 4;
 
 /// What the bundle is to reach, by a search for the settings that do.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,6 +83,8 @@ pub struct Options {
     pub all_sheets: bool,
     /// Texels keep the colours of what lies there, whatever playback makes of them.
     pub plain: bool,
+    /// Nothing is tried: what is left open is what mostly does.
+    pub quick: bool,
     /// What to reach; `None`: what the settings give.
     pub goal: Option<Goal>,
     /// Bytes of working memory that playing may take beside another goal than [`Goal::Ram`]; `None`: a search takes what is usual.
@@ -106,6 +112,7 @@ impl Default for Options {
             independent_every: Settings::default().coding.independent_every,
             all_sheets: false,
             plain: false,
+            quick: false,
             goal: None,
             room: None,
             truth: TruthFrames::Most(16),
@@ -115,6 +122,20 @@ impl Default for Options {
 }
 
 impl Options {
+    /// The same with nothing left open that would be tried, but for charts, which the scene may bring.
+    #[must_use]
+    pub fn quick(self) -> Self {
+        Self {
+            key_interval: self.key_interval.or(Some(QUICK_INTERVAL)),
+            space: self.space.or(Some(SPACE_CUBIC)),
+            source: atlas::Settings { outline: self.source.outline.or(Some(0)), ..self.source },
+            rewarp: self.rewarp.or(Some(false)),
+            all_sheets: true,
+            quick: true,
+            ..self
+        }
+    }
+
     /// The settings for a screen `width` pixels wide, the baker's choices filled in.
     #[must_use]
     pub fn settings(&self, width: u32) -> Settings {
