@@ -260,13 +260,7 @@ mod tests {
     use super::*;
     use crate::job::bake_scene;
     use crate::options::{Goal, Options, TruthFrames};
-    use crate::scene::{Scene, builtin};
-
-    fn small(name: &str) -> Scene {
-        let mut scene = builtin::build(name).unwrap();
-        (scene.playback.width, scene.playback.height, scene.playback.frames) = (48, 36, 9);
-        scene
-    }
+    use crate::tune::tests::small;
 
     #[test]
     fn a_budget_is_kept_and_more_of_it_is_no_worse() {

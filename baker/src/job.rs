@@ -62,7 +62,7 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
     let choice = choice(tracer, options, progress)?;
     let options = &Options { charts: Some(choice), ..*options };
     let mut baked = toward(tracer, options, progress)?;
-    if let Some(budget) = options.budget()
+    if let Some(budget) = options.limits().bytes
         && baked.settings.atlas.storage != options.source().storage
     {
         // By what it takes with the outline that was chosen for it.
@@ -82,7 +82,7 @@ fn toward(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Res
     match goal {
         // What needs no more memory than there is stays as it is; where it cannot be had at all, the search says why.
         Goal::Ram(_) => match usual(options.storage) {
-            Ok(baked) if usual::reaches(goal, &baked) => Ok(baked),
+            Ok(baked) if usual::reaches(goal, options.limits(), &baked) => Ok(baked),
             Ok(Baked { settings, report, psnr_before: psnr, .. }) => {
                 once(tracer, options, Some(Whole { settings, memory: report.memory.workspace, psnr }), progress)
             }
@@ -90,7 +90,9 @@ fn toward(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Res
         },
         Goal::Budget(_) | Goal::Psnr(_) => {
             let found = once(tracer, options, None, progress);
-            usual::or_found((goal, options.room, options.source().storage), &Seen::new(tracer, None), found, |storage| usual(Some(storage)))
+            usual::or_found((goal, options.limits(), options.source().storage), &Seen::new(tracer, None), found, |storage| {
+                usual(Some(storage))
+            })
         }
     }
 }

@@ -165,15 +165,13 @@ impl Options {
         }
     }
 
-    /// The budget of bytes that is to be kept, if that is the goal.
-    pub(crate) fn budget(&self) -> Option<u64> {
-        if let Some(Goal::Budget(budget)) = self.goal { Some(budget) } else { None }
-    }
-
     /// What the bundle has to keep within.
     pub(crate) fn limits(&self) -> Limits {
-        let memory = if let Some(Goal::Ram(room)) = self.goal { Some(room) } else { self.room };
-        Limits { bytes: self.budget(), memory }
+        match self.goal {
+            Some(Goal::Budget(budget)) => Limits { bytes: Some(budget), memory: self.room },
+            Some(Goal::Ram(room)) => Limits { bytes: None, memory: Some(room) },
+            Some(Goal::Psnr(_)) | None => Limits { bytes: None, memory: self.room },
+        }
     }
 
     /// What else helps where a search finds nothing: to leave to it what is given; nothing where nothing is.

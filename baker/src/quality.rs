@@ -138,13 +138,7 @@ mod tests {
     use super::*;
     use crate::job::bake_scene;
     use crate::options::{Goal, Options, TruthFrames};
-    use crate::scene::{Scene, builtin};
-
-    fn small(name: &str) -> Scene {
-        let mut scene = builtin::build(name).unwrap();
-        (scene.playback.width, scene.playback.height, scene.playback.frames) = (48, 36, 9);
-        scene
-    }
+    use crate::tune::tests::small;
 
     #[test]
     fn a_quality_is_reached_or_the_nearest_is_named() {

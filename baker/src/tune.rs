@@ -163,3 +163,15 @@ pub(crate) fn possible<T>(attempt: Result<T, BakeError>, exceeded: &mut Option<B
         other => other.map(Some),
     }
 }
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use crate::scene::{Scene, builtin};
+
+    /// A built-in scene that searches take seconds for.
+    pub(crate) fn small(name: &str) -> Scene {
+        let mut scene = builtin::build(name).unwrap();
+        (scene.playback.width, scene.playback.height, scene.playback.frames) = (48, 36, 9);
+        scene
+    }
+}

@@ -4,44 +4,40 @@
 use crate::atlas::Storage;
 use crate::bake::BakeError;
 use crate::baked::Baked;
-use crate::options::Goal;
+use crate::options::{Goal, Limits};
 use crate::seen::Seen;
 use crate::tune::MOST_MEMORY;
 
 /// What a search for `goal` `found`, or the `usual` bundle, stored as it has to be, where that reaches the goal better: within a budget of bytes with more
-/// quality beside what is `seen`, or a quality with fewer bytes. In more memory than there is `room`, or than searches would take either, it is no answer.
+/// quality beside what is `seen`, or a quality with fewer bytes. Beyond `limits`, or in memory that searches would not take either, it is no answer.
 /// `asked`: how it is stored where nothing has to give.
 ///
 /// # Errors
 /// What the search came to, where the usual bundle does not reach the goal either; those of the player.
 pub(crate) fn or_found(
-    (goal, room, asked): (Goal, Option<usize>, Storage),
+    (goal, limits, asked): (Goal, Limits, Storage),
     seen: &Seen<'_>,
     found: Result<Baked, BakeError>,
     usual: impl FnOnce(Storage) -> Result<Baked, BakeError>,
 ) -> Result<Baked, BakeError> {
-    let reached = |usual: &Baked, most: usize| reaches(goal, usual) && usual.report.memory.workspace <= most;
     let found = match found {
         // Whatever else is wrong is wrong with both.
         Err(error @ (BakeError::Psnr { .. } | BakeError::Ram { .. })) => {
-            return usual(asked).ok().filter(|usual| reached(usual, room.unwrap_or(usize::MAX))).ok_or(error);
+            return usual(asked).ok().filter(|usual| reaches(goal, limits, usual)).ok_or(error);
         }
         found => found?,
     };
     let Some(storage) = found.contested else { return Ok(found) };
     let Ok(usual) = usual(storage) else { return Ok(found) };
-    let most = room.unwrap_or(found.report.memory.workspace.max(MOST_MEMORY));
-    let wins = reached(&usual, most) && better(goal, seen, &usual, &found)?;
+    let most = limits.memory.unwrap_or(found.report.memory.workspace.max(MOST_MEMORY));
+    let wins = reaches(goal, Limits { memory: Some(most), ..limits }, &usual) && better(goal, seen, &usual, &found)?;
     Ok(if wins { usual } else { found })
 }
 
-/// Whether the `usual` bundle reaches `goal`.
-pub(crate) fn reaches(goal: Goal, usual: &Baked) -> bool {
-    match goal {
-        Goal::Budget(most) => usual.bundle.len() as u64 <= most,
-        Goal::Psnr(least) => usual.report.quality.psnr_mean >= least,
-        Goal::Ram(room) => usual.report.memory.workspace <= room,
-    }
+/// Whether the `usual` bundle keeps within `limits`, and is as good as `goal` asks for.
+pub(crate) fn reaches(goal: Goal, limits: Limits, usual: &Baked) -> bool {
+    let good = if let Goal::Psnr(least) = goal { usual.report.quality.psnr_mean >= least } else { true };
+    good && limits.over(usual.bundle.len() as u64, usual.report.memory.workspace) == 0
 }
 
 /// Whether `usual` is a better answer than `found`; both reach the goal.

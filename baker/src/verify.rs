@@ -341,7 +341,7 @@ fn compare(
         psnr_min,
         worst_frame,
         ssim_mean: listed(|run| &run.ssim).sum::<f64>() / f64::from(gbuffer.frames.max(1)),
-        psnr_bilinear: if all { metrics::mean_psnr(listed(|run| &run.bilinear)) } else { 0.0 },
+        psnr_bilinear: metrics::mean_psnr(listed(|run| &run.bilinear)),
         wrong_surface_percent: 100.0 * wrong as f64 / gbuffer.label.len().max(1) as f64,
         path_error_texels: PathError { p50: path.percentile(0.5), p99: path.percentile(0.99), max: path.max() },
     })

@@ -127,6 +127,14 @@ impl Charting {
         other
     }
 
+    /// Those of `faces`, all of them one chart's, whose middles lie beyond a line across one of its flattened coordinates, where that one has this value;
+    /// `None` where one side of it has none.
+    pub(super) fn beyond(&self, faces: &[u32], (axis, value): (usize, f64)) -> Option<Vec<u32>> {
+        let lies_beyond = |face: &u32| self.outline(*face as usize).iter().map(|corner| corner[axis]).sum::<f64>() >= 3.0 * value;
+        let far: Vec<u32> = faces.iter().copied().filter(lies_beyond).collect();
+        (!far.is_empty() && far.len() < faces.len()).then_some(far)
+    }
+
     /// How far the faces of each chart reach in depth, flattened units; below zero where it has none.
     pub(super) fn deep(&self) -> Vec<f64> {
         let mut range = vec![(f64::INFINITY, f64::NEG_INFINITY); self.charts.len()];

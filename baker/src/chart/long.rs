@@ -6,13 +6,12 @@ use super::charting::Charting;
 
 /// Texels that a chart wants to be long, of those that it can be, from which on it is cut: what it then gains is worth a seam.
 const LONG: f64 = 1.25;
+/// Times that it is, at most.
+pub(super) const CUTS: usize = 5;
 
 /// Cuts charts, each in two at most; returns whether there were any to cut.
 pub(super) fn split(charting: &mut Charting) -> bool {
     let before = charting.charts.len();
-    if charting.charts.iter().all(|chart| chart.wanted < LONG) {
-        return false;
-    }
     for (chart, faces) in (0u32..).zip(charting.members()) {
         let of = &charting.charts[chart as usize];
         if of.wanted < LONG {
@@ -21,9 +20,7 @@ pub(super) fn split(charting: &mut Charting) -> bool {
         let sides = [0, 1].map(|axis| of.hi[axis] - of.lo[axis]);
         let axis = usize::from(sides[1] > sides[0]);
         let middle = 0.5 * (of.lo[axis] + of.hi[axis]);
-        let beyond = |face: &u32| charting.outline(*face as usize).iter().map(|corner| corner[axis]).sum::<f64>() >= 3.0 * middle;
-        let far: Vec<u32> = faces.iter().copied().filter(beyond).collect();
-        if !far.is_empty() && far.len() < faces.len() {
+        if let Some(far) = charting.beyond(&faces, (axis, middle)) {
             charting.take_out(chart, &far);
         }
     }

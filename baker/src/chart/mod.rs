@@ -44,9 +44,6 @@ pub(crate) use warp::rewarp;
 /// What takes the place of depth where there is no projection: two surfaces that lie on each other in a texture are seldom level in it.
 const OBLIQUE: DVec3 = DVec3::new(0.48, 0.64, 0.6);
 
-/// Times that long charts are cut in two, at most.
-const CUTS: usize = 5;
-
 /// How the faces are shared out among charts: what a cut changes.
 pub(crate) struct Parts {
     chart_of: Vec<u32>,
@@ -56,14 +53,10 @@ pub(crate) struct Parts {
 impl Charting {
     /// Cuts chart `chart` in two along a line across one of its flattened coordinates, where that one has this value: faces go to the side that their
     /// middles lie on. Returns what was before; `None`, and nothing is done, where one side would have none.
-    pub(crate) fn sever(&mut self, hits: &Hits, chart: usize, (axis, value): (usize, f64)) -> Option<Parts> {
-        let beyond = |corners: &[[f64; 4]; 3]| corners.iter().map(|corner| corner[axis] / corner[3]).sum::<f64>() >= 3.0 * value;
+    pub(crate) fn sever(&mut self, hits: &Hits, chart: usize, line: (usize, f64)) -> Option<Parts> {
         let own = (0u32..).zip(&self.chart_of).filter(|(_, of)| **of == chart as u32);
         let faces: Vec<u32> = own.map(|(face, _)| face).collect();
-        let far: Vec<u32> = faces.iter().copied().filter(|&face| beyond(&self.corners[face as usize])).collect();
-        if far.is_empty() || far.len() == faces.len() {
-            return None;
-        }
+        let far = self.beyond(&faces, line)?;
         let before = Parts { chart_of: self.chart_of.clone(), charts: self.charts.clone() };
         self.take_out(chart as u32, &far);
         measure::bound(hits, self);
@@ -154,13 +147,14 @@ pub fn build(scene: &Scene, hits: &Hits, family: Family, density: &Density, max_
         }
     }
     let seen = density.detail.is_finite().then(|| blur::Seen::new(scene, hits));
+    let measure = |charting: &mut Charting| measure::measure(scene, hits, seen.as_ref(), charting, density, max_side);
     let mut charting = Charting { charts: Vec::new(), chart_of: Vec::new(), corners: Vec::new(), warps: Vec::new(), faces };
     let mut best: Option<(f64, Vec<u32>, Vec<Chart>)> = None;
     for clusters in candidates {
         let chart = |(view, depth): (&View, f64)| Chart::new(view.projection(depth), density.most);
         charting.charts = clusters.views.iter().zip(charting.depths(&clusters)).map(chart).collect();
         charting.chart_of = clusters.of;
-        measure::measure(scene, hits, seen.as_ref(), &mut charting, density, max_side);
+        measure(&mut charting);
         let price = price::price(hits, &charting);
         if best.as_ref().is_none_or(|b| price < b.0) {
             best = Some((price, std::mem::take(&mut charting.chart_of), std::mem::take(&mut charting.charts)));
@@ -171,19 +165,21 @@ pub fn build(scene: &Scene, hits: &Hits, family: Family, density: &Density, max_
     }
     if let Some(islands) = islands {
         islands.take(scene, &mut charting);
-        measure::measure(scene, hits, seen.as_ref(), &mut charting, density, max_side);
+        measure(&mut charting);
     }
     charting.flatten(scene);
     let (folded, parted) = (fold::split(hits, &mut charting, &links), apart::split(scene, hits, &mut charting, &links));
     if folded || parted {
-        measure::measure(scene, hits, seen.as_ref(), &mut charting, density, max_side);
+        measure(&mut charting);
     }
     // Where nothing is said of what texels are worth, a plane that runs to the horizon wants any number of them.
-    for _ in 0..if seen.is_some() { CUTS } else { 0 } {
-        if !long::split(&mut charting) {
-            break;
+    if seen.is_some() {
+        for _ in 0..long::CUTS {
+            if !long::split(&mut charting) {
+                break;
+            }
+            measure(&mut charting);
         }
-        measure::measure(scene, hits, seen.as_ref(), &mut charting, density, max_side);
     }
     charting
 }
