@@ -15,7 +15,7 @@ use crate::scene::Scene;
 use crate::sheets::{self, KeyGrid, Layers, Sheets};
 use crate::verify::VerifyError;
 use crate::walls;
-use crate::{brinks, cuts, prune, settle, spare, tears, timing};
+use crate::{brinks, cuts, kinks, prune, settle, spare, tears, timing};
 use cubist_core::format::{SPACE_CUBIC, TIME_CUBIC};
 use std::time::Instant;
 use thiserror::Error;
@@ -273,6 +273,8 @@ pub fn fitted(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let grid = KeyGrid::new(exact, cell_log2, settings.key_interval, scene.playback.looping, [settings.time, settings.space]);
     let adapted = if settings.adapt_keys { timing::place(exact, &grid) } else { None };
     let grid = adapted.map_or(grid.clone(), |keys| grid.with_keys(keys));
+    let kinked = if settings.adapt_keys { kinks::keys(exact, &grid) } else { None };
+    let grid = kinked.map_or(grid.clone(), |keys| grid.with_keys(keys));
     let cut = if settings.adapt_keys { cuts::keys(exact, &grid) } else { None };
     let grid = cut.map_or(grid.clone(), |keys| grid.with_keys(keys));
     // In small cells and short intervals a few pixels are much.

@@ -29,6 +29,7 @@ pub mod gbuffer;
 pub mod inspect;
 pub mod job;
 mod joins;
+mod kinks;
 mod made;
 pub mod metrics;
 pub mod options;
