@@ -71,7 +71,7 @@ impl Parts {
         let find = |index: usize| {
             let block = Block::new(grid, index);
             let any = block.torn(tears, grid).next().is_some();
-            any.then(|| (index, block.parts(gbuffer, tears, grid, least)))
+            any.then(|| (index, block.parts(gbuffer, tears, grid, grid.least(index / grid.grid.cells(), least))))
         };
         Self { torn: (0..grid.intervals() * grid.grid.cells()).into_par_iter().filter_map(find).collect() }
     }

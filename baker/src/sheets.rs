@@ -86,6 +86,14 @@ impl KeyGrid {
         if (0..count).contains(&index) { self.end(index as usize) - self.keys[index as usize] } else { 0 }
     }
 
+    /// How many pixels of a cell count in interval `interval` if `least` do in most: in one at most a quarter as long as those are on the mean, its share of
+    /// them, or a surface that shows all along would be missing there.
+    #[must_use]
+    pub fn least(&self, interval: usize, least: u32) -> u32 {
+        let (length, mean) = (self.frames_of(interval).len() as u32, self.spacing());
+        if 4 * length <= mean { (least * length / mean).max(1) } else { least }
+    }
+
     /// The key at the end of interval `interval`.
     #[must_use]
     pub fn second_key(&self, interval: usize) -> usize {
@@ -199,7 +207,7 @@ pub fn find(gbuffer: &GBuffer, grid: &KeyGrid, least: u32) -> Sheets {
             }
             // Most seen first, ties by label: what is cut off is the least.
             counts.sort_by_key(|&(label, count)| (std::cmp::Reverse(count), label));
-            let kept = counts.iter().take(MAX_SHEETS).take_while(|&&(_, count)| count >= least).count().max(1);
+            let kept = counts.iter().take(MAX_SHEETS).take_while(|&&(_, count)| count >= grid.least(index / cells, least)).count().max(1);
             let dropped: u64 = counts[kept..].iter().map(|&(_, count)| u64::from(count)).sum();
             counts.truncate(kept);
             counts.reverse();

@@ -12,7 +12,7 @@ use cubist_baker::trace::Tracer;
 use cubist_core::Bundle;
 use cubist_core::format::SPACE_LINEAR;
 use cubist_tests::hard::exact::{self, Meeting};
-use cubist_tests::hard::{self, Baked, CASES, Figures, baseline, rays};
+use cubist_tests::hard::{self, Baked, CASES, Figures, baseline, motion, rays};
 use cubist_tests::play;
 use cubist_tests::reference::{self, Reference, Weights};
 
@@ -155,6 +155,7 @@ cases! {
     a_soup: 26.0, 1.4, 14.0;
     a_cut: 25.5, 1.1, 7.0;
     a_standing_camera: 35.5, 0.3, 4.0, nothing_flickers;
+    a_camera_that_stops: 28.0, 1.2, 7.0, nothing_moves_on;
     half_a_turn_between_two_keys: 21.5, 0.8, 46.0;
     along_rows_of_texels: 98.0, 0.1, 0.5;
     // The ring is cut into eight pieces, the vault along a slit: no way leads across.
@@ -209,10 +210,21 @@ fn as_good_as_at_home(_: &Baked, figures: &Figures) {
 
 /// Where nothing moves, a pixel in two hundred at most changes from one frame to the next.
 fn nothing_flickers(baked: &Baked, _: &Figures) {
-    let frames = play::frames(&baked.encoded.bundle, 0..baked.scene.playback.frames).expect("it plays");
+    let (most, all) = most_changes(baked, 0);
+    assert!(200 * most <= all, "{most} of {all} pixels change");
+}
+
+/// Where the camera has stopped, hardly a pixel moves on: along the curve through keys eight frames apart a third of them would.
+fn nothing_moves_on(baked: &Baked, _: &Figures) {
+    let (most, all) = most_changes(baked, motion::STOP);
+    assert!(16 * most <= all, "{most} of {all} pixels change");
+}
+
+/// How many pixels change from one frame to the next, at most, from frame `from` on; and of how many.
+fn most_changes(baked: &Baked, from: u32) -> (usize, usize) {
+    let frames = play::frames(&baked.encoded.bundle, from..baked.scene.playback.frames).expect("it plays");
     let changes = frames.windows(2).map(|pair| pair[0].iter().zip(&pair[1]).filter(|(a, b)| a != b).count());
-    let most = changes.max().unwrap_or(0);
-    assert!(200 * most <= frames[0].len(), "{most} of {} pixels change", frames[0].len());
+    (changes.max().unwrap_or(0), frames[0].len())
 }
 
 /// Two pixels of a cell that see the same surface side by side at places that lie far apart in the picture: a seam or a slit runs between.

@@ -4,7 +4,7 @@
 pub mod baseline;
 pub mod build;
 pub mod exact;
-mod motion;
+pub mod motion;
 mod outlines;
 pub mod rays;
 mod sheets;
@@ -51,7 +51,7 @@ const fn own(name: &'static str, why: &'static str, scene: fn() -> Scene) -> Cas
 }
 
 /// All hard scenes.
-pub const CASES: [Case; 30] = [
+pub const CASES: [Case; 31] = [
     flat("shared_edges", "rays run exactly through corners and edges that triangles share", rays::shared_edges),
     flat("along_a_face", "rays run along a face: its determinant is zero", rays::along_a_face),
     flat("inside_a_solid", "rays start within a solid and meet backs only", rays::inside_a_solid),
@@ -76,6 +76,7 @@ pub const CASES: [Case; 30] = [
     flat("a_soup", "edges of five faces, faces through faces, faces there twice", sheets::a_soup),
     flat("a_cut", "nothing after a frame has to do with anything before", motion::a_cut),
     flat("a_standing_camera", "nothing moves: nothing may flicker", motion::a_standing_camera),
+    flat("a_camera_that_stops", "a curve through the keys moves on, and comes back", motion::a_camera_that_stops),
     flat("half_a_turn_between_two_keys", "two keys see nothing in common", motion::half_a_turn_between_two_keys),
     flat("along_rows_of_texels", "every pixel looks at the very edge between two texels, or just beside it", motion::along_rows_of_texels),
     own("around_a_ring", "charts end where they begin: between there is the long way", motion::around_a_ring),

@@ -8,6 +8,9 @@ use cubist_baker::scene::Scene;
 use glam::DVec3;
 use std::sync::Arc;
 
+/// The frame at which a camera stops.
+pub const STOP: u32 = 12;
+
 /// A cut: half-way the camera stands elsewhere.
 pub fn a_cut() -> Scene {
     town().finish("a-cut", |s| if s < 0.5 { town_path(s) } else { orbit(DVec3::new(0.0, 0.6, 0.0), 130.0 + 20.0 * s, 5.0, 3.0) })
@@ -16,6 +19,11 @@ pub fn a_cut() -> Scene {
 /// A camera that stands still.
 pub fn a_standing_camera() -> Scene {
     town().finish("a-standing-camera", |_| town_path(0.4))
+}
+
+/// A camera that goes along, stops at once in the middle of a key interval, and stands.
+pub fn a_camera_that_stops() -> Scene {
+    town().finish("a-camera-that-stops", |s| town_path((s * f64::from(FRAMES - 1)).min(STOP.into()) / 6.0 - 1.0))
 }
 
 /// A camera that turns about within one key interval, and stands before and after.
