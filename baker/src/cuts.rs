@@ -8,8 +8,8 @@ use crate::gbuffer::GBuffer;
 use crate::sheets::KeyGrid;
 use rayon::prelude::*;
 
-/// A place that moves farther than this from one frame to the next, texels, is another place.
-const FAR: f32 = 32.0;
+/// A place that moves farther than one of these from one frame to the next, texels, may be another place: the camera may jump by little.
+const FAR: [f32; 4] = [32.0, 16.0, 8.0, 4.0];
 /// At a cut this share of the screen, background aside, sees another place, percent, and
 const MOST: usize = 60;
 /// from the frame before to the last before it, and after it likewise, at most this.
@@ -24,22 +24,26 @@ const STRANGE: usize = 50;
 #[must_use]
 pub fn keys(gbuffer: &GBuffer, grid: &KeyGrid) -> Option<Vec<u32>> {
     let last = grid.frames - 1;
-    let jumps: Vec<usize> = (0..last).into_par_iter().map(|frame| jump(gbuffer, grid.size, [frame, frame + 1])).collect();
-    let calm = |frame: Option<usize>| frame.and_then(|frame| jumps.get(frame)).is_none_or(|&jump| jump <= LEAST);
-    let cuts = (0..jumps.len()).filter(|&at| jumps[at] >= MOST && calm(at.checked_sub(1)) && calm(Some(at + 1)));
+    let jumps: Vec<[usize; FAR.len()]> = (0..last).into_par_iter().map(|frame| jump(gbuffer, grid.size, [frame, frame + 1])).collect();
+    // Between two frames that are a jump apart, and those before and after them that are not.
+    let cut = |jump: [usize; FAR.len()], around: [Option<usize>; 2]| {
+        let calm = |far: usize| around.iter().flatten().filter_map(|&at| jumps.get(at)).all(|jump| jump[far] <= LEAST);
+        (0..FAR.len()).any(|far| jump[far] >= MOST && calm(far))
+    };
+    let cuts = (0..jumps.len()).filter(|&at| cut(jumps[at], [at.checked_sub(1), Some(at + 1)]));
     let mut keys: Vec<u32> = cuts.map(|at| at as u32).flat_map(|at| at.saturating_sub(1)..=(at + 2).min(last)).collect();
     // A path that loops may well end elsewhere than it begins.
-    if grid.looping && last > 1 && jump(gbuffer, grid.size, [last, 0]) >= MOST && calm(Some(0)) && calm(Some(jumps.len() - 1)) {
+    if grid.looping && last > 1 && cut(jump(gbuffer, grid.size, [last, 0]), [Some(0), Some(jumps.len() - 1)]) {
         keys.extend([0, 1, last - 1, last]);
     }
-    let cut = keys.clone();
+    let at_cuts = keys.clone();
     keys.extend(&grid.keys);
     keys.sort_unstable();
     keys.dedup();
     let seen: Vec<Vec<usize>> = (0..grid.frames).into_par_iter().map(|frame| seen(gbuffer, grid.size, frame)).collect();
     let mut at = 0;
     while let Some(&[from, to]) = keys.get(at..at + 2) {
-        let within = to > from + 1 && !cut.contains(&from) && !cut.contains(&to);
+        let within = to > from + 1 && !at_cuts.contains(&from) && !at_cuts.contains(&to);
         if within && strange(&seen[from as usize], &seen[to as usize]) {
             keys.insert(at + 1, from.midpoint(to));
         } else {
@@ -76,10 +80,10 @@ fn strange(a: &[usize], b: &[usize]) -> bool {
     alone(a, b) || alone(b, a)
 }
 
-/// The share of the pixels, background aside, that see another place in the second of two frames than in the first, percent. Of all pixels: a fence
-/// whose boards are as far apart as nodes passes all of those at once.
-fn jump(gbuffer: &GBuffer, [width, height]: [usize; 2], frames: [u32; 2]) -> usize {
-    let (mut jumps, mut count) = (0, 0);
+/// The share of the pixels, background aside, that see another place in the second of two frames than in the first, percent, for each that is [`FAR`].
+/// Of all pixels: a fence whose boards are as far apart as nodes passes all of those at once.
+fn jump(gbuffer: &GBuffer, [width, height]: [usize; 2], frames: [u32; 2]) -> [usize; FAR.len()] {
+    let (mut jumps, mut count) = ([0; FAR.len()], 0);
     let frames = frames.map(|frame| frame as usize * width * height..(frame as usize + 1) * width * height);
     for (from, to) in frames[0].clone().zip(frames[1].clone()) {
         // Behind everything nothing moves.
@@ -87,12 +91,14 @@ fn jump(gbuffer: &GBuffer, [width, height]: [usize; 2], frames: [u32; 2]) -> usi
             continue;
         }
         let [a, b] = [from, to].map(|pixel| gbuffer.uv[pixel]);
-        let far = (a[0] - b[0]).abs().max((a[1] - b[1]).abs()) > FAR;
-        jumps += usize::from(far || gbuffer.label[from] != gbuffer.label[to]);
+        let (step, other) = ((a[0] - b[0]).abs().max((a[1] - b[1]).abs()), gbuffer.label[from] != gbuffer.label[to]);
+        for (jumps, far) in jumps.iter_mut().zip(FAR) {
+            *jumps += usize::from(other || step > far);
+        }
         count += 1;
     }
     // Little is seen: it may come and go as it likes.
-    if 8 * count < width * height { 0 } else { 100 * jumps / count }
+    jumps.map(|jumps| if 8 * count < width * height { 0 } else { 100 * jumps / count })
 }
 
 #[cfg(test)]
@@ -114,6 +120,12 @@ mod tests {
     fn a_cut_gets_two_keys_on_either_side() {
         assert_eq!(of(|frame| frame as f32 + if frame > 11 { 100.0 } else { 0.0 }), Some(vec![0, 8, 10, 11, 12, 13, 16, 23]));
         assert_eq!(of(|frame| if frame > 0 { 100.0 } else { 0.0 }), Some(vec![0, 1, 2, 8, 16, 23]), "after the first frame");
+        assert_eq!(of(|frame| frame as f32 + if frame > 11 { 5.0 } else { 0.0 }), Some(vec![0, 8, 10, 11, 12, 13, 16, 23]), "a small one");
+        assert_eq!(
+            of(|frame| 5.0 * frame as f32 + if frame > 11 { 5.0 } else { 0.0 }),
+            Some(vec![0, 8, 10, 11, 12, 13, 16, 23]),
+            "in motion"
+        );
     }
 
     #[test]
