@@ -11,12 +11,12 @@
 //! | | | else keys twice as far apart | shows as much for fewer bytes |
 //! | | | else closer ones | outlines may turn though surfaces go straight on |
 //! | many | in between | keys twice as far apart, else closer ones | the same |
-//! | many | bend | nothing | |
+//! | many | bend | closer keys | the path may turn too quickly for usual ones |
 //! | few | steady | keys twice as far apart, and again | the same |
 //! | | | else closer ones | outlines may turn though surfaces go straight on |
 //! | few | in between | closer keys | the same |
 //! | few | bend | keys twice as close | shows more |
-//! | | | with cells twice as large besides | rough land: shows more, in less memory |
+//! | | | with cells twice as large besides, and then the usual ones again | rough land: shows more, in less memory |
 //!
 //! Two kinds of paths have closer keys tried besides, down to one a frame, whatever crosses cells. Brief ones, of up to [`BRIEF`] frames, mostly go fast, and
 //! a trial of them takes little time: all that is tried counts there, not only what comes before the first gain. On longer ones something may pass close by
@@ -56,6 +56,8 @@ const TIME: f64 = 0.2;
 const CLOSEST: u32 = 4;
 /// Steps tried where positions bend, at most: fast turns want keys much closer.
 const BENT_TRIES: usize = 4;
+/// Steps tried from there with the usual cells, where those are worth more after all.
+const BACK_TRIES: usize = 3;
 /// Texels of the same from which on closer keys are tried whatever crosses cells: a path that turns as fast shows nothing right between its keys, and in
 /// every cell outlines of what passes by.
 const FAST: f64 = 5.0;
@@ -117,7 +119,7 @@ type Climb = (Take, &'static [Step], usize);
 
 /// The climbs worth a try after cells of `cell` pixels gave `quality`, on a path that is `brief` all of them, else each if those before it lead nowhere;
 /// and why.
-fn climbs(cell: u32, quality: &Brief, brief: bool) -> Option<(&'static [Climb], &'static str)> {
+fn climbs(cell: u32, quality: &Brief, brief: bool) -> (&'static [Climb], &'static str) {
     // Smaller cells are there for the picture: keys still farther apart would take that back.
     const FINER: Climb = (Take::First, &[Step::FINER], 1);
     const FARTHER: Climb = (Take::First, &[Step::DOUBLE], 1);
@@ -128,6 +130,8 @@ fn climbs(cell: u32, quality: &Brief, brief: bool) -> Option<(&'static [Climb], 
     const FASTER: Climb = (Take::Most, &[Step::HALF, Step::EIGHTH, Step::CLOSER], BENT_TRIES);
     // Where a camera shakes, keys twice as close hit no more of it.
     const FASTEST: Climb = (Take::First, &[Step::HALF, Step::EIGHTH], BENT_TRIES);
+    // Lattices bend too, and are as torn with keys as close.
+    const HALVED: Climb = (Take::First, &[Step::HALF], BENT_TRIES);
     const BRIEFLY: Climb = (Take::First, &[Step::HALF, Step::COARSER, Step::CLOSER], BENT_TRIES);
     let (torn, bent) = (quality.wrong_surface_percent >= TORN, quality.path_error_texels.p99);
     let climbs: &[Climb] = match torn {
@@ -139,12 +143,12 @@ fn climbs(cell: u32, quality: &Brief, brief: bool) -> Option<(&'static [Climb], 
         true if bent < BENT => &[FARTHER, CLOSE],
         true if brief => &[FASTEST],
         true if passing(quality) => &[FASTER],
+        true => &[HALVED],
         false if bent >= BENT => &[CLOSER],
         false if bent < STEADY && brief => &[FAR, BRIEFLY],
         false if bent < STEADY => &[FAR, CLOSE],
         false if brief => &[BRIEFLY],
         false => &[CLOSE],
-        true => return None,
     };
     let why = match torn {
         true if bent >= BENT && cell <= USUAL => BENDING,
@@ -152,7 +156,7 @@ fn climbs(cell: u32, quality: &Brief, brief: bool) -> Option<(&'static [Climb], 
         false if bent >= BENT => BENDING,
         false => STEADILY,
     };
-    Some((climbs, why))
+    (climbs, why)
 }
 
 /// What `keys` closer together (`Less`) or farther apart gain, dB, that are worth so much more beside `exact` rays, less what their `time` in every frame is
@@ -192,11 +196,14 @@ impl Gains<'_> {
             return Ok(f64::NEG_INFINITY);
         }
         let exact = made.worth(picture) - self.exact;
-        if made.settings.cell != usual.settings.cell {
+        // Of a lattice more is seen with closer keys at any rate: what counts is what it takes.
+        let lattice = all.wrong_surface_percent >= TORN && all.path_error_texels.p99 >= BENT && !passing(all);
+        if lattice || made.settings.cell != usual.settings.cell {
             return Ok(exact);
         }
-        // Keys closer than usual ones take as many times the time.
-        let time = TIME * f64::from(CLOSEST) / f64::from(made.settings.key_interval.clamp(1, CLOSEST));
+        // Keys closer than usual ones take as many times the time, and memory fewer frames to be filled in: by the square of that.
+        let times = f64::from(CLOSEST) / f64::from(made.settings.key_interval.clamp(1, CLOSEST));
+        let time = TIME * times * times;
         // Where surfaces bend, exact rays say what there is to gain, at any price.
         let free_of_charge = all.path_error_texels.p99 >= BENT;
         gain(keys, exact, [if free_of_charge { 0.0 } else { time }, time], || {
@@ -204,6 +211,42 @@ impl Gains<'_> {
             self.visible = Some(before);
             Ok(seen.worth(made, flat, picture)? - before)
         })
+    }
+}
+
+/// What was tried, and the best of it.
+struct Trials<'a> {
+    scene: &'a Scene,
+    space: &'a dyn Fn(u32) -> u8,
+    progress: Progress<'a>,
+    gains: Gains<'a>,
+    /// Frames between keys that stand closer than usual, at least.
+    closest: u32,
+    /// What is worth most of all that is worth more than the usual bundle, and by how much.
+    better: Option<(f64, Made)>,
+    tried: usize,
+    /// Tries that are expected, at most.
+    most: usize,
+}
+
+impl Trials<'_> {
+    /// By how much a bundle of `settings` is worth more than the usual one; `None` where there is none, or none is wanted.
+    fn gain(&mut self, settings: &Settings) -> Result<Option<f64>, BakeError> {
+        let &mut Self { scene, space, progress, closest, most, .. } = self;
+        if settings.key_interval < closest.min(self.gains.usual.settings.key_interval) {
+            return Ok(None);
+        }
+        progress("trying other cells", (self.tried as f64 / most as f64).min(1.0));
+        self.tried += 1;
+        // Smaller cells may be more than a bundle can hold: then the usual ones it is.
+        let Some(made) = Made::tried(scene, self.gains.flat, Settings { space: space(settings.cell), ..*settings })? else {
+            return Ok(None);
+        };
+        let gained = self.gains.of(&made)?;
+        if gained > self.better.as_ref().map_or(0.0, |&(most, _)| most) {
+            self.better = Some((gained, made));
+        }
+        Ok(Some(gained))
     }
 }
 
@@ -222,39 +265,31 @@ pub(crate) fn choose(
     progress: Progress<'_>,
 ) -> Result<(Made, Option<Other>), BakeError> {
     let brief = scene.playback.frames <= BRIEF;
-    let Some((climbs, why)) = climbs(usual.settings.cell, all, brief) else { return Ok((usual, None)) };
+    let (climbs, why) = climbs(usual.settings.cell, all, brief);
     let picture = usual.picture(flat);
-    let mut gains = Gains { usual: &usual, all, flat, seen, picture, exact: usual.worth(picture), visible: None };
     // Where a path turns quickly, or is short, keys stand much closer already.
     let (asked, spacing) = (usual.settings.key_interval, usual.encoded.grid.spacing());
     let stand = Settings { key_interval: if 2 * spacing <= asked { spacing } else { asked }, ..usual.settings };
-    let closest = if brief || passing(all) { 1 } else { CLOSEST.min((stand.key_interval / 2).max(1)) };
+    let closest = if brief || passing(all) || all.path_error_texels.p99 >= BENT { 1 } else { (stand.key_interval / 4).max(1) };
+    let most = climbs.iter().map(|(.., tries)| tries).sum();
+    let gains = Gains { usual: &usual, all, flat, seen, picture, exact: usual.worth(picture), visible: None };
+    let mut trials = Trials { scene, space, progress, gains, closest, better: None, tried: 0, most };
     let free = Free { cell: true, interval: true, lambda: false, time: false, space: false, frames: scene.playback.frames };
-    let mut better: Option<(f64, Made)> = None;
-    let most: usize = climbs.iter().map(|(.., tries)| tries).sum();
-    let mut tried = 0;
     for &(take, steps, tries) in climbs {
-        climb((stand, 0.0), &free, (take, steps), tries, |settings| {
-            let closer = settings.key_interval < usual.settings.key_interval && all.path_error_texels.p99 < BENT;
-            if closer && settings.key_interval < closest {
-                return Ok(None);
-            }
-            progress("trying other cells", f64::from(tried) / most as f64);
-            tried += 1;
-            // Smaller cells may be more than a bundle can hold: then the usual ones it is.
-            let Some(made) = Made::tried(scene, flat, Settings { space: space(settings.cell), ..*settings })? else { return Ok(None) };
-            let gained = gains.of(&made)?;
-            if gained > better.as_ref().map_or(0.0, |&(most, _)| most) {
-                better = Some((gained, made));
-            }
-            Ok(Some(gained))
-        })?;
+        climb((stand, 0.0), &free, (take, steps), tries, |settings| trials.gain(settings))?;
         // On brief paths closer keys may be worth far more than what was tried before them.
-        if better.is_some() && !brief {
+        if trials.better.is_some() && !brief {
             break;
         }
     }
-    let Some((_, better)) = better else { return Ok((usual, None)) };
+    // What larger cells lose may be more than they save where keys stand close together.
+    let larger = trials.better.as_ref().filter(|(_, better)| better.settings.cell > stand.cell);
+    if let Some((gained, closer)) = larger.map(|(gained, better)| (*gained, Settings { cell: stand.cell, ..better.settings }))
+        && let Some(back) = trials.gain(&closer)?.filter(|&back| back > gained)
+    {
+        climb((closer, back), &free, (Take::First, &[Step::HALF]), BACK_TRIES, |settings| trials.gain(settings))?;
+    }
+    let Some((_, better)) = trials.better else { return Ok((usual, None)) };
     let why = match why {
         STEADILY if better.settings.key_interval < usual.settings.key_interval => TURNING,
         CROSSING if better.settings.key_interval < usual.settings.key_interval => SWEEPING,
@@ -422,33 +457,24 @@ mod tests {
     fn what_is_tried_depends_on_outlines_and_bends() {
         let of = |cell, wrong_surface_percent, p99, brief| {
             let path_error_texels = verify::PathError { p99, ..verify::PathError::default() };
-            climbs(cell, &Brief { wrong_surface_percent, path_error_texels, ..Brief::default() }, brief)
-                .map(|(climbs, why)| (climbs.len(), why.split(' ').next().unwrap()))
+            let (climbs, why) = climbs(cell, &Brief { wrong_surface_percent, path_error_texels, ..Brief::default() }, brief);
+            (climbs.len(), why.split(' ').next().unwrap())
         };
         let tried = |cell, wrong_surface_percent, p99| of(cell, wrong_surface_percent, p99, false);
         // Torn and steady, torn and not quite so, both torn and bent, the last in large cells; bent; neither; steady.
-        assert_eq!([tried(8, 2.0, 0.9), tried(8, 2.0, 1.0), tried(8, 2.0, 2.0)], [Some((3, "many")), Some((2, "many")), None]);
-        assert_eq!(
-            [tried(16, 2.0, 2.0), tried(8, 1.9, 2.0), tried(8, 1.9, 1.9)],
-            [Some((3, "many")), Some((1, "surfaces")), Some((1, "surfaces"))]
-        );
-        assert_eq!(tried(8, 1.9, 0.9), Some((2, "surfaces")));
+        assert_eq!([tried(8, 2.0, 0.9), tried(8, 2.0, 1.0), tried(8, 2.0, 2.0)], [(3, "many"), (2, "many"), (1, "surfaces")]);
+        assert_eq!([tried(16, 2.0, 2.0), tried(8, 1.9, 2.0), tried(8, 1.9, 1.9)], [(3, "many"), (1, "surfaces"), (1, "surfaces")]);
+        assert_eq!(tried(8, 1.9, 0.9), (2, "surfaces"));
         // So fast that outlines are no matter.
-        assert_eq!([tried(8, 20.0, 4.9), tried(8, 20.0, 5.0)], [None, Some((1, "surfaces"))]);
+        assert_eq!([tried(8, 20.0, 4.9), tried(8, 20.0, 5.0)], [(1, "surfaces"); 2]);
         // What passes by in some frames is worth a try of keys close together, first.
         let uneven = |cell, wrong_surface_percent, p99| {
             let path_error_texels = verify::PathError { p99, ..verify::PathError::default() };
             let quality = Brief { psnr_mean: 30.0, psnr_min: 26.0, wrong_surface_percent, path_error_texels };
-            climbs(cell, &quality, false).map(|(climbs, _)| climbs.len())
+            climbs(cell, &quality, false).0.len()
         };
-        assert_eq!(
-            [uneven(8, 2.0, 0.9), uneven(8, 2.0, 1.0), uneven(8, 2.0, 2.0), uneven(8, 1.9, 2.0)],
-            [Some(3), Some(2), Some(1), Some(1)]
-        );
+        assert_eq!([uneven(8, 2.0, 0.9), uneven(8, 2.0, 1.0), uneven(8, 2.0, 2.0), uneven(8, 1.9, 2.0)], [3, 2, 1, 1]);
         // On a brief path closer keys come last, or alone.
-        assert_eq!(
-            [of(8, 2.0, 0.9, true), of(8, 2.0, 1.0, true), of(8, 2.0, 2.0, true)].map(|of| of.map(|of| of.0)),
-            [Some(3), Some(2), Some(1)]
-        );
+        assert_eq!([of(8, 2.0, 0.9, true), of(8, 2.0, 1.0, true), of(8, 2.0, 2.0, true)].map(|of| of.0), [3, 2, 1]);
     }
 }

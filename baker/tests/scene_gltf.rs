@@ -205,8 +205,13 @@ fn colours_of_every_kind_and_emission() {
     b.list("accessors")[colours]["normalized"] = json!(true);
     b.push("materials", json!({ "emissiveFactor": [0.25, 0.5, 1.0], "pbrMetallicRoughness": { "baseColorFactor": [0, 0, 0, 1] } }));
     b.push("materials", json!({ "extensions": { "KHR_materials_unlit": {}, "KHR_materials_pbrSpecularGlossiness": { "diffuseFactor": [0.1, 0.2, 0.3, 1] } } }));
-    b.roof(json!({ "attributes": { "POSITION": positions, "COLOR_0": colours }, "mode": 6, "material": 1 }));
+    // No mesh has this one: how it blends is no matter.
+    b.push("materials", json!({ "alphaMode": "BLEND" }));
+    let primitive = |material: u32| json!({ "attributes": { "POSITION": positions, "COLOR_0": colours }, "mode": 6, "material": material });
+    b.push("meshes", json!({ "primitives": [primitive(1), primitive(0)] }));
+    b.push("nodes", json!({ "mesh": 0 }));
     let scene = b.load().unwrap();
+    assert!(!scene.warnings.iter().any(|warning| warning.contains("BLEND")), "{:?}", scene.warnings);
     let t = &scene.triangles[0];
     assert!((t.colour[0] - Vec3::new(0.0, 1.0, 0.5)).length() < 1e-4);
     assert_eq!((scene.materials[0].colour, scene.materials[0].unlit), (Vec3::new(0.25, 0.5, 1.0), true));

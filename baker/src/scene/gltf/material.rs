@@ -11,7 +11,7 @@ use ::gltf::json::material::AlphaMode;
 use ::gltf::json::texture::WrappingMode;
 use ::gltf::json::validation::Checked;
 use glam::{Affine2, Mat2, Vec2, Vec3};
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 /// Which texture coordinates a material wants, and what it does to them.
@@ -23,12 +23,19 @@ pub(crate) struct Mapping {
     pub transform: Affine2,
 }
 
-/// Appends every material of the file to `model`, and one more for primitives without. A material's mapping has
-/// the same index; `None`: no texture.
+/// Appends every material of the file to `model`, and one more for primitives without; those that no mesh has are left plain, and nothing is said of
+/// them. A material's mapping has the same index; `None`: no texture.
 pub(crate) fn load(data: Data<'_>, folder: &Path, fallback: Option<&Path>, model: &mut Model) -> Result<Vec<Option<Mapping>>, String> {
     let mut shelf = Shelf { data, folder, known: HashMap::new(), lowest: Vec::new() };
     let mut mappings = Vec::new();
+    let primitives = data.root.meshes.iter().flat_map(|mesh| &mesh.primitives);
+    let used: HashSet<usize> = primitives.filter_map(|primitive| Some(primitive.material?.value())).collect();
     for (i, material) in data.root.materials.iter().enumerate() {
+        if !used.contains(&i) {
+            model.materials.push(Material::default());
+            mappings.push(None);
+            continue;
+        }
         let name = material.name.as_ref().map_or(format!("material {i}"), |n| format!("material \"{n}\""));
         mappings.push(one(&mut shelf, material, &name, model).map_err(|e| format!("{name}: {e}"))?);
     }
