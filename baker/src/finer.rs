@@ -18,7 +18,7 @@
 //! | few | bend | keys twice as close | shows more |
 //! | | | with cells twice as large besides, and then the usual ones again | rough land: shows more, in less memory |
 //!
-//! Two kinds of paths have closer keys tried besides, down to one a frame, whatever crosses cells. Brief ones, of up to [`BRIEF`] frames, mostly go fast, and
+//! Two kinds of paths have much closer keys tried besides, down to one a frame, whatever crosses cells. Brief ones, of up to [`BRIEF`] frames, mostly go fast, and
 //! a trial of them takes little time: all that is tried counts there, not only what comes before the first gain. On longer ones something may pass close by
 //! the camera between two keys (see `passing`): closer keys then come first.
 
@@ -51,8 +51,7 @@ const CROSSING: &str = "many outlines cross every cell";
 const SWEEPING: &str = "outlines sweep past between keys";
 /// What keys [`CLOSEST`] frames apart have to gain there, dB: they take time in every frame. As much may farther ones lose of what is seen.
 const TIME: f64 = 0.2;
-/// Frames between keys, at least, where nothing bends and they do not stand closer as it is: keys closer than that take more of every frame's time than all
-/// else.
+/// Frames between keys from which on they are cheap: closer ones take more of every frame's time than all else.
 const CLOSEST: u32 = 4;
 /// Steps tried where positions bend, at most: fast turns want keys much closer.
 const BENT_TRIES: usize = 4;
@@ -201,7 +200,7 @@ impl Gains<'_> {
         if lattice || made.settings.cell != usual.settings.cell {
             return Ok(exact);
         }
-        // Keys closer than usual ones take as many times the time, and memory fewer frames to be filled in: by the square of that.
+        // Keys closer than that take as many times the time. A straight price would have a key every other frame on paths that are slow.
         let times = f64::from(CLOSEST) / f64::from(made.settings.key_interval.clamp(1, CLOSEST));
         let time = TIME * times * times;
         // Where surfaces bend, exact rays say what there is to gain, at any price.
@@ -220,8 +219,6 @@ struct Trials<'a> {
     space: &'a dyn Fn(u32) -> u8,
     progress: Progress<'a>,
     gains: Gains<'a>,
-    /// Frames between keys that stand closer than usual, at least.
-    closest: u32,
     /// What is worth most of all that is worth more than the usual bundle, and by how much.
     better: Option<(f64, Made)>,
     tried: usize,
@@ -230,12 +227,9 @@ struct Trials<'a> {
 }
 
 impl Trials<'_> {
-    /// By how much a bundle of `settings` is worth more than the usual one; `None` where there is none, or none is wanted.
+    /// By how much a bundle of `settings` is worth more than the usual one; `None` where there is none.
     fn gain(&mut self, settings: &Settings) -> Result<Option<f64>, BakeError> {
-        let &mut Self { scene, space, progress, closest, most, .. } = self;
-        if settings.key_interval < closest.min(self.gains.usual.settings.key_interval) {
-            return Ok(None);
-        }
+        let &mut Self { scene, space, progress, most, .. } = self;
         progress("trying other cells", (self.tried as f64 / most as f64).min(1.0));
         self.tried += 1;
         // Smaller cells may be more than a bundle can hold: then the usual ones it is.
@@ -270,10 +264,9 @@ pub(crate) fn choose(
     // Where a path turns quickly, or is short, keys stand much closer already.
     let (asked, spacing) = (usual.settings.key_interval, usual.encoded.grid.spacing());
     let stand = Settings { key_interval: if 2 * spacing <= asked { spacing } else { asked }, ..usual.settings };
-    let closest = if brief || passing(all) || all.path_error_texels.p99 >= BENT { 1 } else { (stand.key_interval / 4).max(1) };
     let most = climbs.iter().map(|(.., tries)| tries).sum();
     let gains = Gains { usual: &usual, all, flat, seen, picture, exact: usual.worth(picture), visible: None };
-    let mut trials = Trials { scene, space, progress, gains, closest, better: None, tried: 0, most };
+    let mut trials = Trials { scene, space, progress, gains, better: None, tried: 0, most };
     let free = Free { cell: true, interval: true, lambda: false, time: false, space: false, frames: scene.playback.frames };
     for &(take, steps, tries) in climbs {
         climb((stand, 0.0), &free, (take, steps), tries, |settings| trials.gain(settings))?;
@@ -430,6 +423,30 @@ mod tests {
         let (kept, other) = chosen(&scene, &flat, usual);
         assert_eq!((kept.settings.key_interval, other.is_some()), (1, true));
         assert!(kept.quality.psnr_mean > before + 2.0, "{before} {}", kept.told());
+    }
+
+    /// A path gone along so many times as fast, from its beginning anew at its end.
+    struct Quick(Arc<dyn Path>, f64);
+
+    impl Path for Quick {
+        fn pose(&self, s: f64) -> Pose {
+            self.0.pose((s * self.1).fract())
+        }
+    }
+
+    #[test]
+    fn torn_turns_get_closer_keys_on_long_paths() {
+        let (mut scene, _, _) = made("mirrors", [96, 72], 4, Settings::default());
+        scene.playback.frames = 70;
+        scene.camera = Arc::new(Quick(scene.camera, 3.0));
+        let flat = bake::flatten(&scene, &Settings::default().atlas, &|_, _| {}).unwrap();
+        let usual = Made::new(&scene, &flat, Settings { key_interval: 8, ..Settings::default() }).unwrap();
+        let (quality, before) = (usual.quality, usual.quality.psnr_mean);
+        let torn = quality.wrong_surface_percent >= TORN && quality.path_error_texels.p99 >= BENT;
+        assert!(torn && !passing(&quality), "{quality:?}");
+        let (kept, other) = chosen(&scene, &flat, usual);
+        assert!(kept.settings.key_interval < 8 && kept.settings.cell == 8 && other.is_some(), "{}", kept.told());
+        assert!(kept.quality.psnr_mean > before + 1.0, "{before} {}", kept.told());
     }
 
     #[test]
