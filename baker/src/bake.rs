@@ -8,7 +8,7 @@ use crate::chart;
 use crate::encode::{self, CodingSettings, Content};
 use crate::fit::{self, Fit};
 use crate::folds::{self, Folded};
-use crate::gbuffer::Lens;
+use crate::gbuffer::{GBuffer, Lens};
 use crate::order::{self, Coverage};
 use crate::planes::{self, FlatChart};
 use crate::scene::Scene;
@@ -256,6 +256,17 @@ pub struct Fitted {
     seconds: f64,
 }
 
+/// Frames for keys, where those that the grid has will not do.
+type Keys = fn(&GBuffer, &KeyGrid) -> Option<Vec<u32>>;
+
+/// The grid with keys where they are needed. Those of kinks may stand for others close by, those of cuts come beside them all.
+fn adapted(gbuffer: &GBuffer, grid: KeyGrid) -> KeyGrid {
+    [timing::place as Keys, kinks::keys, cuts::keys].into_iter().fold(grid, |grid, keys| match keys(gbuffer, &grid) {
+        Some(keys) => grid.with_keys(keys),
+        None => grid,
+    })
+}
+
 /// Finds the sheets and fits their positions: nothing that depends on the outline of the source image.
 ///
 /// # Errors
@@ -271,12 +282,7 @@ pub fn fitted(scene: &Scene, flat: &Flat, settings: &Settings, progress: Progres
     let Atlas { image, gbuffer: exact, .. } = &flat.atlas;
     let cell_log2 = settings.cell.trailing_zeros() as u8;
     let grid = KeyGrid::new(exact, cell_log2, settings.key_interval, scene.playback.looping, [settings.time, settings.space]);
-    let adapted = if settings.adapt_keys { timing::place(exact, &grid) } else { None };
-    let grid = adapted.map_or(grid.clone(), |keys| grid.with_keys(keys));
-    let kinked = if settings.adapt_keys { kinks::keys(exact, &grid) } else { None };
-    let grid = kinked.map_or(grid.clone(), |keys| grid.with_keys(keys));
-    let cut = if settings.adapt_keys { cuts::keys(exact, &grid) } else { None };
-    let grid = cut.map_or(grid.clone(), |keys| grid.with_keys(keys));
+    let grid = if settings.adapt_keys { adapted(exact, grid) } else { grid };
     // In small cells and short intervals a few pixels are much.
     let volume = settings.cell * settings.cell * settings.key_interval;
     let least = if volume < 512 { settings.least_pixels.min(volume / 64).max(1) } else { settings.least_pixels };

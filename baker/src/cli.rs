@@ -73,17 +73,19 @@ pub struct Bake {
     /// lose .5 to 3.5 dB.
     ///
     /// Where neither this nor --key-interval is given, lattices and foliage get cells half as large with keys twice as far apart, and rough land, smooth
-    /// bodies and fast paths cells twice as large with keys twice as close, if that shows more for the bytes.
+    /// bodies and fast paths cells twice as large with keys twice as close, or usual cells with keys closer
+    /// still, if that shows more for the bytes.
     #[arg(long, value_name = "PX", value_parser = cell)]
     pub cell: Option<u32>,
     /// Frames between keys, 1 to 256 [default: 8; 16 or more where that shows as much for the bytes, fewer where that shows more].
     ///
-    /// That is the mean: keys stand closer where the view turns quickly, and at a path's ends, unless --even-keys says otherwise.
+    /// That is the mean: keys stand closer where the view turns quickly, where motion stops, starts, turns or jumps at once, and at a
+    /// path's ends, unless --even-keys says otherwise.
     ///
     /// Keys twice as far apart take a third fewer bytes and half as much of every frame's time. Each holds more, for what comes into view between two of
     /// them: that is up to a sixth more memory. Without this and --cell they are tried where surfaces go nearly straight on from key to key, and closer
-    /// ones where that leads nowhere, on paths of up to 64 frames down to a key a frame: what is seen of either beside the antialiased scene decides, and
-    /// what it takes.
+    /// ones where that leads nowhere, and on fast paths, down to a key a frame: what is seen of either beside the antialiased scene decides, and what it
+    /// takes.
     #[arg(long, value_name = "FRAMES", value_parser = clap::value_parser!(u32).range(1..=256))]
     pub key_interval: Option<u32>,
     /// Keys stand every --key-interval frames, whether or not they are needed there.
@@ -164,7 +166,7 @@ pub struct Bake {
     ///
     /// Auto leaves out of a cell what shows less there than its bytes are worth, as --lambda counts them, and only where a bundle without it is worth more:
     /// keys of models take a tenth to a third fewer bytes then, and their player up to half less memory, for 0 to .2 dB. All keeps whatever covers
-    /// eight pixels of a cell in all frames between two keys.
+    /// eight pixels of a cell in all frames between two keys, fewer where these are a frame or two.
     #[arg(long, value_enum, value_name = "KIND", default_value_t = Sheets::Auto)]
     pub sheets: Sheets,
     /// What texels are coloured by.

@@ -1,18 +1,20 @@
 //! Cuts, and turns too quick for the keys around them: where keys are added.
 //! The G-buffer and the keys' frames come in; the frames go out with more among them.
 //!
-//! At a cut the camera jumps, and nothing seen after it has to do with what was seen before: keys on either side keep interpolation from reaching across. In
+//! At a cut the camera jumps: nothing seen after it has to do with what was seen before, or places move by much more than before and after. Keys on either side keep interpolation from reaching across. In
 //! a quick turn two keys see hardly anything in common: keys go in between.
 
 use crate::gbuffer::GBuffer;
+use crate::kinks::{ANOTHER, difference, size};
 use crate::sheets::KeyGrid;
 use rayon::prelude::*;
 
-/// A place that moves farther than one of these from one frame to the next, texels, may be another place: the camera may jump by little.
-const FAR: [f32; 4] = [32.0, 16.0, 8.0, 4.0];
+/// A place that moves farther than the first of these from one frame to the next, texels, is another place. One that moves farther than another, but not the
+/// last, may be: a camera may jump by little.
+const FAR: [f32; 8] = [ANOTHER, 23.0, 16.0, 11.0, 8.0, 5.6, 4.0, 2.8];
 /// At a cut this share of the screen, background aside, sees another place, percent, and
 const MOST: usize = 60;
-/// from the frame before to the last before it, and after it likewise, at most this.
+/// from the frame before to the last before it, and after it likewise, at most this; where the jump is small, another place seven tenths as far away.
 const LEAST: usize = 20;
 /// A key that sees more than this share of its pixels on surfaces that the next one sees nothing of, or the other way round, percent, is too far from it.
 const STRANGE: usize = 50;
@@ -26,14 +28,17 @@ pub fn keys(gbuffer: &GBuffer, grid: &KeyGrid) -> Option<Vec<u32>> {
     let last = grid.frames - 1;
     let jumps: Vec<[usize; FAR.len()]> = (0..last).into_par_iter().map(|frame| jump(gbuffer, grid.size, [frame, frame + 1])).collect();
     // Between two frames that are a jump apart, and those before and after them that are not.
-    let cut = |jump: [usize; FAR.len()], around: [Option<usize>; 2]| {
+    let cut = |jump: [usize; FAR.len()], around: [Option<usize>; 2], small: bool| {
         let calm = |far: usize| around.iter().flatten().filter_map(|&at| jumps.get(at)).all(|jump| jump[far] <= LEAST);
-        (0..FAR.len()).any(|far| jump[far] >= MOST && calm(far))
+        jump[0] >= MOST && calm(0) || small && (1..FAR.len() - 1).any(|far| jump[far] >= MOST && calm(far + 1))
     };
-    let cuts = (0..jumps.len()).filter(|&at| cut(jumps[at], [at.checked_sub(1), Some(at + 1)]));
-    let mut keys: Vec<u32> = cuts.map(|at| at as u32).flat_map(|at| at.saturating_sub(1)..=(at + 2).min(last)).collect();
+    let cuts = |small| (0..jumps.len()).filter(|&at| cut(jumps[at], [at.checked_sub(1), Some(at + 1)], small)).collect::<Vec<usize>>();
+    // Jumps that come as often as keys are how things move here.
+    let cuts = Some(cuts(true)).filter(|cuts| cuts.len() <= (grid.intervals() / 2).max(1)).unwrap_or_else(|| cuts(false));
+    let around = |at: usize| (at as u32).saturating_sub(1)..=(at as u32 + 2).min(last);
+    let mut keys: Vec<u32> = cuts.into_iter().flat_map(around).collect();
     // A path that loops may well end elsewhere than it begins.
-    if grid.looping && last > 1 && cut(jump(gbuffer, grid.size, [last, 0]), [Some(0), Some(jumps.len() - 1)]) {
+    if grid.looping && last > 1 && cut(jump(gbuffer, grid.size, [last, 0]), [Some(0), Some(jumps.len() - 1)], true) {
         keys.extend([0, 1, last - 1, last]);
     }
     let at_cuts = keys.clone();
@@ -80,7 +85,7 @@ fn strange(a: &[usize], b: &[usize]) -> bool {
     alone(a, b) || alone(b, a)
 }
 
-/// The share of the pixels, background aside, that see another place in the second of two frames than in the first, percent, for each that is [`FAR`].
+/// The share of the pixels, background aside, that see another place in the second of two frames than in the first, percent, for each distance of [`FAR`].
 /// Of all pixels: a fence whose boards are as far apart as nodes passes all of those at once.
 fn jump(gbuffer: &GBuffer, [width, height]: [usize; 2], frames: [u32; 2]) -> [usize; FAR.len()] {
     let (mut jumps, mut count) = ([0; FAR.len()], 0);
@@ -90,8 +95,7 @@ fn jump(gbuffer: &GBuffer, [width, height]: [usize; 2], frames: [u32; 2]) -> [us
         if gbuffer.label[from] == 0 && gbuffer.label[to] == 0 {
             continue;
         }
-        let [a, b] = [from, to].map(|pixel| gbuffer.uv[pixel]);
-        let (step, other) = ((a[0] - b[0]).abs().max((a[1] - b[1]).abs()), gbuffer.label[from] != gbuffer.label[to]);
+        let (step, other) = (size(difference(gbuffer.uv[from], gbuffer.uv[to])), gbuffer.label[from] != gbuffer.label[to]);
         for (jumps, far) in jumps.iter_mut().zip(FAR) {
             *jumps += usize::from(other || step > far);
         }
@@ -121,11 +125,8 @@ mod tests {
         assert_eq!(of(|frame| frame as f32 + if frame > 11 { 100.0 } else { 0.0 }), Some(vec![0, 8, 10, 11, 12, 13, 16, 23]));
         assert_eq!(of(|frame| if frame > 0 { 100.0 } else { 0.0 }), Some(vec![0, 1, 2, 8, 16, 23]), "after the first frame");
         assert_eq!(of(|frame| frame as f32 + if frame > 11 { 5.0 } else { 0.0 }), Some(vec![0, 8, 10, 11, 12, 13, 16, 23]), "a small one");
-        assert_eq!(
-            of(|frame| 5.0 * frame as f32 + if frame > 11 { 5.0 } else { 0.0 }),
-            Some(vec![0, 8, 10, 11, 12, 13, 16, 23]),
-            "in motion"
-        );
+        let in_motion = of(|frame| 5.0 * frame as f32 + if frame > 11 { 20.0 } else { 0.0 });
+        assert_eq!(in_motion, Some(vec![0, 8, 10, 11, 12, 13, 16, 23]), "in motion");
     }
 
     #[test]
@@ -160,5 +161,7 @@ mod tests {
     fn motion_is_no_cut_however_fast() {
         assert_eq!(of(|frame| frame as f32), None);
         assert_eq!(of(|frame| 40.0 * frame as f32), None);
+        assert_eq!(of(|frame| 4.055 * frame as f32 - 0.025 * (frame * frame) as f32), None, "just above 4 texels a frame, then just below");
+        assert_eq!(of(|frame| 6.0 * (frame / 2) as f32), None, "every other frame is shown twice");
     }
 }

@@ -18,7 +18,7 @@
 //! | few | bend | keys twice as close | shows more |
 //! | | | with cells twice as large besides, and then the usual ones again | rough land: shows more, in less memory |
 //!
-//! Two kinds of paths have much closer keys tried besides, down to one a frame, whatever crosses cells. Brief ones, of up to [`BRIEF`] frames, mostly go fast, and
+//! Two kinds of paths have keys an eighth as far apart tried at once besides, whatever crosses cells. Brief ones, of up to [`BRIEF`] frames, mostly go fast, and
 //! a trial of them takes little time: all that is tried counts there, not only what comes before the first gain. On longer ones something may pass close by
 //! the camera between two keys (see `passing`): closer keys then come first.
 
@@ -49,7 +49,7 @@ const BENDING: &str = "surfaces bend on their way from key to key";
 /// The same where many outlines are.
 const CROSSING: &str = "many outlines cross every cell";
 const SWEEPING: &str = "outlines sweep past between keys";
-/// What keys [`CLOSEST`] frames apart have to gain there, dB: they take time in every frame. As much may farther ones lose of what is seen.
+/// What keys [`CLOSEST`] frames apart have to gain, dB: they take time in every frame. As much may farther ones lose of what is seen.
 const TIME: f64 = 0.2;
 /// Frames between keys from which on they are cheap: closer ones take more of every frame's time than all else.
 const CLOSEST: u32 = 4;
@@ -113,6 +113,12 @@ fn passing(quality: &Brief) -> bool {
     uneven(wrong_surface_percent, [psnr_mean, psnr_min]).is_some() || wrong_surface_percent >= TORN && path_error_texels.p99 >= FAST
 }
 
+/// Whether many outlines cross cells and positions bend, as on lattices, but nothing says that the path goes fast.
+fn lattice(cell: u32, quality: &Brief, brief: bool) -> bool {
+    let many = quality.wrong_surface_percent >= TORN && quality.path_error_texels.p99 >= BENT;
+    many && cell <= USUAL && !brief && !passing(quality)
+}
+
 /// Steps to climb by, which of them is taken, and how many tries they get.
 type Climb = (Take, &'static [Step], usize);
 
@@ -129,7 +135,7 @@ fn climbs(cell: u32, quality: &Brief, brief: bool) -> (&'static [Climb], &'stati
     const FASTER: Climb = (Take::Most, &[Step::HALF, Step::EIGHTH, Step::CLOSER], BENT_TRIES);
     // Where a camera shakes, keys twice as close hit no more of it.
     const FASTEST: Climb = (Take::First, &[Step::HALF, Step::EIGHTH], BENT_TRIES);
-    // Lattices bend too, and are as torn with keys as close.
+    // Lattices bend too, and stay as torn with closer keys.
     const HALVED: Climb = (Take::First, &[Step::HALF], BENT_TRIES);
     const BRIEFLY: Climb = (Take::First, &[Step::HALF, Step::COARSER, Step::CLOSER], BENT_TRIES);
     let (torn, bent) = (quality.wrong_surface_percent >= TORN, quality.path_error_texels.p99);
@@ -141,8 +147,8 @@ fn climbs(cell: u32, quality: &Brief, brief: bool) -> (&'static [Climb], &'stati
         true if bent < BENT && passing(quality) => &[FASTER, FARTHER],
         true if bent < BENT => &[FARTHER, CLOSE],
         true if brief => &[FASTEST],
-        true if passing(quality) => &[FASTER],
-        true => &[HALVED],
+        true if lattice(cell, quality, brief) => &[HALVED],
+        true => &[FASTER],
         false if bent >= BENT => &[CLOSER],
         false if bent < STEADY && brief => &[FAR, BRIEFLY],
         false if bent < STEADY => &[FAR, CLOSE],
@@ -174,6 +180,8 @@ struct Gains<'a> {
     usual: &'a Made,
     /// Its quality before sheets were left out.
     all: &'a Brief,
+    /// The path is, too.
+    brief: bool,
     /// What they are made from, and hold the scene against.
     flat: &'a Flat,
     seen: &'a Seen<'a>,
@@ -188,7 +196,7 @@ struct Gains<'a> {
 impl Gains<'_> {
     /// By how much `made` is worth more.
     fn of(&mut self, made: &Made) -> Result<f64, BakeError> {
-        let &mut Self { usual, all, flat, seen, picture, .. } = self;
+        let &mut Self { usual, all, brief, flat, seen, picture, .. } = self;
         let [before, after] = [usual, made].map(|made| made.quality.wrong_surface_percent);
         let keys = made.settings.key_interval.cmp(&usual.settings.key_interval);
         if keys == Ordering::Greater && all.wrong_surface_percent < TORN && after > FLICKER * before {
@@ -196,11 +204,10 @@ impl Gains<'_> {
         }
         let exact = made.worth(picture) - self.exact;
         // Of a lattice more is seen with closer keys at any rate: what counts is what it takes.
-        let lattice = all.wrong_surface_percent >= TORN && all.path_error_texels.p99 >= BENT && !passing(all);
-        if lattice || made.settings.cell != usual.settings.cell {
+        if lattice(usual.settings.cell, all, brief) || made.settings.cell != usual.settings.cell {
             return Ok(exact);
         }
-        // Keys closer than that take as many times the time. A straight price would have a key every other frame on paths that are slow.
+        // Keys n times as close take n times the time, and have to gain n squared as much: for n times slow paths would have a key every other frame.
         let times = f64::from(CLOSEST) / f64::from(made.settings.key_interval.clamp(1, CLOSEST));
         let time = TIME * times * times;
         // Where surfaces bend, exact rays say what there is to gain, at any price.
@@ -221,17 +228,27 @@ struct Trials<'a> {
     gains: Gains<'a>,
     /// What is worth most of all that is worth more than the usual bundle, and by how much.
     better: Option<(f64, Made)>,
-    tried: usize,
-    /// Tries that are expected, at most.
+    /// What was tried, and what it gained.
+    known: Vec<([u32; 2], Option<f64>)>,
+    /// Tries that are expected, at most; those of going back come on top.
     most: usize,
 }
 
 impl Trials<'_> {
     /// By how much a bundle of `settings` is worth more than the usual one; `None` where there is none.
     fn gain(&mut self, settings: &Settings) -> Result<Option<f64>, BakeError> {
-        let &mut Self { scene, space, progress, most, .. } = self;
-        progress("trying other cells", (self.tried as f64 / most as f64).min(1.0));
-        self.tried += 1;
+        let name = [settings.cell, settings.key_interval];
+        if let Some(&(_, gained)) = self.known.iter().find(|(known, _)| *known == name) {
+            return Ok(gained);
+        }
+        (self.progress)("trying other cells", (self.known.len() as f64 / self.most as f64).min(1.0));
+        let gained = self.anew(settings)?;
+        self.known.push((name, gained));
+        Ok(gained)
+    }
+
+    fn anew(&mut self, settings: &Settings) -> Result<Option<f64>, BakeError> {
+        let &mut Self { scene, space, .. } = self;
         // Smaller cells may be more than a bundle can hold: then the usual ones it is.
         let Some(made) = Made::tried(scene, self.gains.flat, Settings { space: space(settings.cell), ..*settings })? else {
             return Ok(None);
@@ -265,8 +282,8 @@ pub(crate) fn choose(
     let (asked, spacing) = (usual.settings.key_interval, usual.encoded.grid.spacing());
     let stand = Settings { key_interval: if 2 * spacing <= asked { spacing } else { asked }, ..usual.settings };
     let most = climbs.iter().map(|(.., tries)| tries).sum();
-    let gains = Gains { usual: &usual, all, flat, seen, picture, exact: usual.worth(picture), visible: None };
-    let mut trials = Trials { scene, space, progress, gains, better: None, tried: 0, most };
+    let gains = Gains { usual: &usual, all, brief, flat, seen, picture, exact: usual.worth(picture), visible: None };
+    let mut trials = Trials { scene, space, progress, gains, better: None, known: Vec::new(), most };
     let free = Free { cell: true, interval: true, lambda: false, time: false, space: false, frames: scene.playback.frames };
     for &(take, steps, tries) in climbs {
         climb((stand, 0.0), &free, (take, steps), tries, |settings| trials.gain(settings))?;

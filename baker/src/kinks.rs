@@ -11,10 +11,13 @@ use cubist_core::format::TIME_CUBIC;
 use rayon::prelude::*;
 
 /// Steps from frame to frame longer than this, texels, are to another place.
-const FAR: f32 = 32.0;
-/// How much a pixel's step changes where it is part of a kink: by this, texels, over the frames from key to key. Curves go wrong by an eighth of it at most.
+pub(crate) const ANOTHER: f32 = 32.0;
+/// Frames between keys from which on a curve has room to go wrong in.
+const LEAST: u32 = 4;
+/// How much a pixel's step changes where it is part of a kink: by this, texels, over the frames from key to key. Curves go wrong by three sixteenths of it
+/// at most.
 const CHANGE: f32 = 4.0;
-/// So much of what is seen before and after a kink is part of it, percent.
+/// So many of the pixels that show the same surface before and after a kink are part of it, percent.
 const MOST: f32 = 10.0;
 /// The two frames before a kink and the two after it change at most this share of what it does: else motion is fast, not new.
 const AROUND: f32 = 0.25;
@@ -36,14 +39,14 @@ struct Motion {
 #[must_use]
 pub fn keys(gbuffer: &GBuffer, grid: &KeyGrid) -> Option<Vec<u32>> {
     let spacing = grid.spacing();
-    if spacing < 4 {
+    if spacing < LEAST {
         return None;
     }
     let motions: Vec<Motion> =
         (0..grid.frames).into_par_iter().map(|frame| motion(gbuffer, grid, frame, CHANGE / spacing as f32)).collect();
     let kinks: Vec<[u32; 2]> = (0..grid.frames).filter_map(|frame| kink(&motions, grid, frame)).collect();
-    // Where they come as often as keys, other intervals are what helps.
-    if kinks.len() > grid.intervals() / 2 {
+    // Where their keys, two each, are more than the others, other intervals are what helps.
+    if kinks.len() > (grid.intervals() / 2).max(1) {
         return None;
     }
     let kinks: Vec<u32> = kinks.into_iter().flatten().collect();
@@ -55,45 +58,46 @@ pub fn keys(gbuffer: &GBuffer, grid: &KeyGrid) -> Option<Vec<u32>> {
     (keys != grid.keys).then_some(keys)
 }
 
-/// The frame `by` frames from `frame`, around a loop; `None` where the path has none.
-fn beside(grid: &KeyGrid, frame: u32, by: i64) -> Option<usize> {
-    let (at, frames) = (i64::from(frame) + by, i64::from(grid.frames));
-    let at = if grid.looping { at.rem_euclid(frames) } else { at };
-    usize::try_from(at).ok().filter(|_| at < frames)
+/// From one position to another.
+pub(crate) fn difference([a, b]: [f32; 2], [c, d]: [f32; 2]) -> [f32; 2] {
+    [c - a, d - b]
+}
+
+/// How far that is, texels.
+pub(crate) fn size([u, v]: [f32; 2]) -> f32 {
+    u.abs().max(v.abs())
 }
 
 /// The frames of the keys of the kink at `frame`, or between it and the next one; `None` where there is none.
 fn kink(motions: &[Motion], grid: &KeyGrid, frame: u32) -> Option<[u32; 2]> {
-    let at = |by: i64| beside(grid, frame, by).map(|frame| motions[frame]).unwrap_or_default();
+    let at = |by: i64| grid.beside(frame, by).map(|frame| motions[frame]).unwrap_or_default();
     let [own, next] = [0, 1].map(at);
     // Where one lies between two frames, both change.
     let between = next.changed > AROUND * own.changed && own.changed > AROUND * next.changed;
     let (changed, after) = if between { (own.changed + next.changed, 2) } else { (own.changed, 1) };
     let around = [-2, -1, after, after + 1].map(|by| at(by).changed).into_iter().fold(0.0, f32::max);
-    if 100.0 * changed <= MOST * own.pixels.max(next.pixels) || around > AROUND * changed {
+    if 100.0 * own.changed.max(next.changed) <= MOST * own.pixels.max(next.pixels) || around > AROUND * changed {
         return None;
     }
     let starts = own.steps[0] < own.steps[1];
-    let by = match between {
-        true => 1,
-        // Straight lines ask for one key.
-        false if grid.time != TIME_CUBIC => 0,
-        false => {
-            if starts {
-                -1
-            } else {
-                1
-            }
-        }
+    // Without curves one key does.
+    let by = if between {
+        1
+    } else if grid.time != TIME_CUBIC {
+        0
+    } else if starts {
+        -1
+    } else {
+        1
     };
-    Some([frame, beside(grid, frame, by)? as u32])
+    Some([frame, grid.beside(frame, by)? as u32])
 }
 
 /// What is seen around `frame` does, where a change by `change` texels counts whole.
 fn motion(gbuffer: &GBuffer, grid: &KeyGrid, frame: u32, change: f32) -> Motion {
     let mut motion = Motion::default();
     let [width, height] = grid.size;
-    let Some(frames) = [-1, 0, 1].map(|by| beside(grid, frame, by)).into_iter().collect::<Option<Vec<usize>>>() else { return motion };
+    let Some(frames) = [-1, 0, 1].map(|by| grid.beside(frame, by)).into_iter().collect::<Option<Vec<usize>>>() else { return motion };
     for place in (0..height).step_by(STEP).flat_map(|y| (0..width).step_by(STEP).map(move |x| y * width + x)) {
         let [before, own, after] = [0, 1, 2].map(|at| frames[at] * width * height + place);
         let label = gbuffer.label[own];
@@ -102,19 +106,20 @@ fn motion(gbuffer: &GBuffer, grid: &KeyGrid, frame: u32, change: f32) -> Motion 
             continue;
         }
         let [a, b, c] = [before, own, after].map(|pixel| gbuffer.uv[pixel]);
-        let size = |d: [f32; 2]| d[0].abs().max(d[1].abs());
-        let steps = [[b[0] - a[0], b[1] - a[1]], [c[0] - b[0], c[1] - b[1]]];
-        if steps.iter().any(|&step| size(step) > FAR) {
+        let steps = [difference(a, b), difference(b, c)];
+        if steps.iter().any(|&step| size(step) > ANOTHER) {
             continue;
         }
         motion.pixels += 1.0;
-        let share = (size([steps[1][0] - steps[0][0], steps[1][1] - steps[0][1]]) / change).min(1.0);
+        let share = (size(difference(steps[0], steps[1])) / change).min(1.0);
         motion.changed += share * share;
         for (sum, step) in motion.steps.iter_mut().zip(steps) {
             *sum += size(step);
         }
     }
-    motion
+    // Beside a cut few pixels show the same surface, and say nothing of the others.
+    let looked_at = (width.div_ceil(STEP) * height.div_ceil(STEP)) as f32;
+    if 16.0 * motion.pixels < looked_at { Motion::default() } else { motion }
 }
 
 #[cfg(test)]

@@ -86,12 +86,20 @@ impl KeyGrid {
         if (0..count).contains(&index) { self.end(index as usize) - self.keys[index as usize] } else { 0 }
     }
 
-    /// How many pixels of a cell count in interval `interval` if `least` do in most: in one at most a quarter as long as those are on the mean, its share of
-    /// them, or a surface that shows all along would be missing there.
+    /// The frame `by` frames from `frame`, around a loop; `None` where the path has none.
+    #[must_use]
+    pub fn beside(&self, frame: u32, by: i64) -> Option<usize> {
+        let (at, frames) = (i64::from(frame) + by, i64::from(self.frames));
+        let at = if self.looping { at.rem_euclid(frames) } else { at };
+        usize::try_from(at).ok().filter(|_| at < frames)
+    }
+
+    /// Pixels that a label needs in a cell of interval `interval` to count, where it needs `least` in one of mean length. Intervals at most a quarter as long
+    /// ask for their share: else a surface that shows all along would be missing there.
     #[must_use]
     pub fn least(&self, interval: usize, least: u32) -> u32 {
         let (length, mean) = (self.frames_of(interval).len() as u32, self.spacing());
-        if 4 * length <= mean { (least * length / mean).max(1) } else { least }
+        if 4 * length <= mean { ((u64::from(least) * u64::from(length) / u64::from(mean)) as u32).max(1) } else { least }
     }
 
     /// The key at the end of interval `interval`.
@@ -207,7 +215,8 @@ pub fn find(gbuffer: &GBuffer, grid: &KeyGrid, least: u32) -> Sheets {
             }
             // Most seen first, ties by label: what is cut off is the least.
             counts.sort_by_key(|&(label, count)| (std::cmp::Reverse(count), label));
-            let kept = counts.iter().take(MAX_SHEETS).take_while(|&&(_, count)| count >= grid.least(index / cells, least)).count().max(1);
+            let least = grid.least(index / cells, least);
+            let kept = counts.iter().take(MAX_SHEETS).take_while(|&&(_, count)| count >= least).count().max(1);
             let dropped: u64 = counts[kept..].iter().map(|&(_, count)| u64::from(count)).sum();
             counts.truncate(kept);
             counts.reverse();

@@ -74,11 +74,7 @@ fn bend(gbuffer: &GBuffer, grid: &KeyGrid, interval: usize) -> f64 {
     let middle = grid.keys[interval] + grid.length(interval as isize) / 2;
     let last = grid.frames - 1;
     let middle = if grid.looping { middle } else { middle.clamp((2 * step).min(last), last.saturating_sub(2 * step)) };
-    let frames = [0, 1, 2, 3, 4].map(|at| {
-        let frame = i64::from(middle) + (at - 2) * i64::from(step);
-        let frame = if grid.looping { frame.rem_euclid(i64::from(grid.frames)) } else { frame };
-        usize::try_from(frame).ok().filter(|&frame| frame <= last as usize)
-    });
+    let frames = [-2, -1, 0, 1, 2].map(|at| grid.beside(middle, at * i64::from(step)));
     let [Some(a), Some(b), Some(c), Some(d), Some(e)] = frames else { return 0.0 };
     let [width, height] = grid.size;
     let spacing = 1usize << grid.grid.log2;

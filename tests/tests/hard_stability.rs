@@ -22,7 +22,7 @@ const FLIPPED: f64 = 0.5;
 /// What is better than this has next to no error: by how much says nothing, dB.
 const PERFECT: f64 = 50.0;
 
-/// Hard scenes that may move by more, where what is moved: dB and percent of a frame, and why. Three of them are at a place where what is
+/// Hard scenes that may move by more, where what is moved: dB and percent of a frame, and why. Five of them are at a place where what is
 /// seen jumps.
 const SHAKY: [(&str, &str, [f64; 2], &str); 16] = [
     ("along_a_face", "scene", [8.0, 55.0], "an eye in the plane of a floor sees none of it, a millionth above it half a screen of it"),

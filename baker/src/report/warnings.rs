@@ -116,7 +116,7 @@ fn still(origin: &Origin<'_>) -> Option<String> {
 /// A frame in which whole things are missing.
 fn missing(quality: &Quality, interval: u32) -> Option<String> {
     let off = uneven(quality.wrong_surface_percent, [quality.psnr_mean, quality.psnr_min])?;
-    let cure = if interval > 1 { "--key-interval 1 keeps most of them" } else { "a slower path, or more --frames, keeps them" };
+    let cure = if interval > 1 { "--key-interval 1 keeps most of it" } else { "a slower path, or more --frames, keeps it" };
     Some(format!(
         "frame {} is {off:.1} dB worse than the mean: what shows for a few frames only, as things that sweep past the camera do, is missing there; {cure}",
         quality.worst_frame
