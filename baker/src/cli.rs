@@ -73,14 +73,13 @@ pub struct Bake {
     /// lose .5 to 3.5 dB.
     ///
     /// Where neither this nor --key-interval is given, lattices and foliage get cells half as large with keys twice as far apart, and rough land, smooth
-    /// bodies and fast paths cells twice as large with keys twice as close, or usual cells with keys closer
-    /// still, if that shows more for the bytes.
+    /// bodies and fast paths cells twice as large with keys twice as close, or usual cells with keys closer still, if that shows more for the bytes.
     #[arg(long, value_name = "PX", value_parser = cell)]
     pub cell: Option<u32>,
     /// Frames between keys, 1 to 256 [default: 8; 16 or more where that shows as much for the bytes, fewer where that shows more].
     ///
-    /// That is the mean: keys stand closer where the view turns quickly, where motion stops, starts, turns or jumps at once, and at a
-    /// path's ends, unless --even-keys says otherwise.
+    /// That is the mean: keys stand closer where the view turns quickly, where motion stops, starts, turns or jumps at once, and at a path's ends, unless
+    /// --even-keys says otherwise.
     ///
     /// Keys twice as far apart take a third fewer bytes and half as much of every frame's time. Each holds more, for what comes into view between two of
     /// them: that is up to a sixth more memory. Without this and --cell they are tried where surfaces go nearly straight on from key to key, and closer

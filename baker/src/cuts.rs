@@ -1,11 +1,10 @@
 //! Cuts, and turns too quick for the keys around them: where keys are added.
 //! The G-buffer and the keys' frames come in; the frames go out with more among them.
 //!
-//! At a cut the camera jumps: nothing seen after it has to do with what was seen before, or places move by much more than before and after. Keys on either side keep interpolation from reaching across. In
-//! a quick turn two keys see hardly anything in common: keys go in between.
+//! At a cut the camera jumps: nothing seen after it has to do with what was seen before, or places move by much more than before and after. Keys on
+//! either side keep interpolation from reaching across. In a quick turn two keys see hardly anything in common: keys go in between.
 
-use crate::gbuffer::GBuffer;
-use crate::kinks::{ANOTHER, difference, size};
+use crate::gbuffer::{ANOTHER, GBuffer, difference, size};
 use crate::sheets::KeyGrid;
 use rayon::prelude::*;
 

@@ -18,9 +18,9 @@
 //! | few | bend | keys twice as close | shows more |
 //! | | | with cells twice as large besides, and then the usual ones again | rough land: shows more, in less memory |
 //!
-//! Two kinds of paths have keys an eighth as far apart tried at once besides, whatever crosses cells. Brief ones, of up to [`BRIEF`] frames, mostly go fast, and
-//! a trial of them takes little time: all that is tried counts there, not only what comes before the first gain. On longer ones something may pass close by
-//! the camera between two keys (see `passing`): closer keys then come first.
+//! Two kinds of paths have keys an eighth as far apart tried at once besides, whatever crosses cells. Brief ones, of up to [`BRIEF`] frames, mostly go
+//! fast, and a trial of them takes little time: all that is tried counts there, not only what comes before the first gain. On longer ones something may
+//! pass close by the camera between two keys (see `passing`): closer keys then come first.
 
 use crate::bake::{BakeError, Flat, Progress, Settings};
 use crate::climb::{Free, Step, Take, climb};
@@ -319,8 +319,17 @@ mod tests {
     use std::sync::Arc;
 
     fn made(name: &str, size: [u32; 2], frames: u32, settings: Settings) -> (Scene, Flat, Made) {
+        along(name, size, frames, settings, |own| own)
+    }
+
+    /// The same where the camera goes along the path that `path` makes of the scene's own.
+    fn along<F>(name: &str, size: [u32; 2], frames: u32, settings: Settings, path: F) -> (Scene, Flat, Made)
+    where
+        F: FnOnce(Arc<dyn Path>) -> Arc<dyn Path>,
+    {
         let mut scene = builtin::build(name).unwrap();
         (scene.playback.width, scene.playback.height, scene.playback.frames) = (size[0], size[1], frames);
+        scene.camera = path(scene.camera);
         let flat = bake::flatten(&scene, &settings.atlas, &|_, _| {}).unwrap();
         let made = Made::new(&scene, &flat, settings).unwrap();
         (scene, flat, made)
@@ -401,11 +410,7 @@ mod tests {
 
     #[test]
     fn shaken_cameras_get_a_key_a_frame() {
-        let (mut scene, _, _) = made("columns", [96, 72], 4, Settings::default());
-        scene.playback.frames = 25;
-        scene.camera = Arc::new(Shaken(scene.camera, 24.0));
-        let flat = bake::flatten(&scene, &Settings::default().atlas, &|_, _| {}).unwrap();
-        let usual = Made::new(&scene, &flat, Settings::default()).unwrap();
+        let (scene, flat, usual) = along("columns", [96, 72], 25, Settings::default(), |own| Arc::new(Shaken(own, 24.0)));
         assert!(usual.quality.wrong_surface_percent >= TORN, "{}", usual.told());
         let before = usual.quality.psnr_mean;
         let (kept, other) = chosen(&scene, &flat, usual);
@@ -416,12 +421,10 @@ mod tests {
     #[test]
     fn brief_turns_get_closer_keys_though_others_gain_too() {
         // Two turns in forty frames: keys farther apart, which are tried first, show a little more.
-        let (mut scene, _, _) = made("pivot", [96, 72], 4, Settings::default());
         let eye = DVec3::new(0.0, 0.5, 0.3);
-        scene.playback.frames = 40;
-        scene.camera = Arc::new(Pivot { eye, azimuth: [0.0, 720.0], elevation: [0.0, 0.0], up: DVec3::Y, fov: 60.0 });
-        let flat = bake::flatten(&scene, &Settings::default().atlas, &|_, _| {}).unwrap();
-        let usual = Made::new(&scene, &flat, Settings { key_interval: 8, ..Settings::default() }).unwrap();
+        let turns = Pivot { eye, azimuth: [0.0, 720.0], elevation: [0.0, 0.0], up: DVec3::Y, fov: 60.0 };
+        let settings = Settings { key_interval: 8, ..Settings::default() };
+        let (scene, flat, usual) = along("pivot", [96, 72], 40, settings, |_| Arc::new(turns));
         let before = usual.quality.psnr_mean;
         let (kept, other) = chosen(&scene, &flat, usual);
         assert_eq!((kept.settings.key_interval, other.is_some()), (1, true), "{}", kept.told());
@@ -431,10 +434,7 @@ mod tests {
     #[test]
     fn short_clips_get_a_key_a_frame_where_they_want_it() {
         // A quarter of a circle in four frames: keys at both ends alone, whatever the interval.
-        let (mut scene, _, _) = made("cone-orbit", [96, 72], 9, Settings::default());
-        scene.playback.frames = 4;
-        let flat = bake::flatten(&scene, &Settings::default().atlas, &|_, _| {}).unwrap();
-        let usual = Made::new(&scene, &flat, Settings::default()).unwrap();
+        let (scene, flat, usual) = made("cone-orbit", [96, 72], 4, Settings::default());
         assert_eq!((usual.encoded.grid.keys.len(), usual.encoded.grid.spacing()), (2, 3));
         let before = usual.quality.psnr_mean;
         let (kept, other) = chosen(&scene, &flat, usual);
@@ -453,11 +453,8 @@ mod tests {
 
     #[test]
     fn torn_turns_get_closer_keys_on_long_paths() {
-        let (mut scene, _, _) = made("mirrors", [96, 72], 4, Settings::default());
-        scene.playback.frames = 70;
-        scene.camera = Arc::new(Quick(scene.camera, 3.0));
-        let flat = bake::flatten(&scene, &Settings::default().atlas, &|_, _| {}).unwrap();
-        let usual = Made::new(&scene, &flat, Settings { key_interval: 8, ..Settings::default() }).unwrap();
+        let settings = Settings { key_interval: 8, ..Settings::default() };
+        let (scene, flat, usual) = along("mirrors", [96, 72], 70, settings, |own| Arc::new(Quick(own, 3.0)));
         let (quality, before) = (usual.quality, usual.quality.psnr_mean);
         let torn = quality.wrong_surface_percent >= TORN && quality.path_error_texels.p99 >= BENT;
         assert!(torn && !passing(&quality), "{quality:?}");

@@ -12,6 +12,19 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// The surface number of a ray that leaves the scene.
 pub const BACKGROUND: u32 = u32::MAX;
 
+/// What moves farther than this from one frame to the next, texels, is another place.
+pub(crate) const ANOTHER: f32 = 32.0;
+
+/// From one place in the source image to another.
+pub(crate) fn difference([a, b]: [f32; 2], [c, d]: [f32; 2]) -> [f32; 2] {
+    [c - a, d - b]
+}
+
+/// How far a difference leads, texels.
+pub(crate) fn size([u, v]: [f32; 2]) -> f32 {
+    u.abs().max(v.abs())
+}
+
 /// The rays of one frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Lens {

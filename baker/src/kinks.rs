@@ -5,13 +5,11 @@
 //! an object that hits the floor. Two keys close by each other, on the slower side, keep it from that: what comes before them tells next to nothing of
 //! how it goes on.
 
-use crate::gbuffer::GBuffer;
+use crate::gbuffer::{ANOTHER, GBuffer, difference, size};
 use crate::sheets::KeyGrid;
 use cubist_core::format::TIME_CUBIC;
 use rayon::prelude::*;
 
-/// Steps from frame to frame longer than this, texels, are to another place.
-pub(crate) const ANOTHER: f32 = 32.0;
 /// Frames between keys from which on a curve has room to go wrong in.
 const LEAST: u32 = 4;
 /// How much a pixel's step changes where it is part of a kink: by this, texels, over the frames from key to key. Curves go wrong by three sixteenths of it
@@ -58,16 +56,6 @@ pub fn keys(gbuffer: &GBuffer, grid: &KeyGrid) -> Option<Vec<u32>> {
     (keys != grid.keys).then_some(keys)
 }
 
-/// From one position to another.
-pub(crate) fn difference([a, b]: [f32; 2], [c, d]: [f32; 2]) -> [f32; 2] {
-    [c - a, d - b]
-}
-
-/// How far that is, texels.
-pub(crate) fn size([u, v]: [f32; 2]) -> f32 {
-    u.abs().max(v.abs())
-}
-
 /// The frames of the keys of the kink at `frame`, or between it and the next one; `None` where there is none.
 fn kink(motions: &[Motion], grid: &KeyGrid, frame: u32) -> Option<[u32; 2]> {
     let at = |by: i64| grid.beside(frame, by).map(|frame| motions[frame]).unwrap_or_default();
@@ -80,15 +68,12 @@ fn kink(motions: &[Motion], grid: &KeyGrid, frame: u32) -> Option<[u32; 2]> {
         return None;
     }
     let starts = own.steps[0] < own.steps[1];
-    // Without curves one key does.
-    let by = if between {
-        1
-    } else if grid.time != TIME_CUBIC {
-        0
-    } else if starts {
-        -1
-    } else {
-        1
+    let by = match between {
+        true => 1,
+        // Without curves one key does.
+        false if grid.time != TIME_CUBIC => 0,
+        false if starts => -1,
+        false => 1,
     };
     Some([frame, grid.beside(frame, by)? as u32])
 }

@@ -2,7 +2,7 @@
 //! the far side of a ring. Found by casting rays between the two; they go to `folds`.
 
 use crate::cast::Cast;
-use crate::gbuffer::{GBuffer, Lens, Sample};
+use crate::gbuffer::{GBuffer, Lens, Sample, difference, size};
 use glam::DVec3;
 use rayon::prelude::*;
 
@@ -68,8 +68,7 @@ impl Pair<'_> {
         if label == 0 || label != self.gbuffer.label[other] {
             return false;
         }
-        let ([a, b], [c, d]) = (self.gbuffer.uv[self.pixel], self.gbuffer.uv[other]);
-        if (a - c).abs().max((b - d).abs()) < CLOSE {
+        if size(difference(self.gbuffer.uv[self.pixel], self.gbuffer.uv[other])) < CLOSE {
             return false;
         }
         self.cast.gaps.open(self.pixel, side, || self.open(other, ray))

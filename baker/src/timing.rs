@@ -4,11 +4,9 @@
 //! Interpolating through four keys leaves an error of about 3/128 of the positions' fourth difference, which grows with the fourth power
 //! of the interval. With a given number of keys the sum of errors is least where intervals are as the error's fifth root to minus one.
 
-use crate::gbuffer::GBuffer;
+use crate::gbuffer::{ANOTHER, GBuffer};
 use crate::sheets::KeyGrid;
 
-/// Larger differences are all the same, texels: the pixel sees another part of the surface.
-const LARGEST: f32 = 32.0;
 /// What else is off, as a fourth difference, texels: below it time does not matter.
 const FLOOR: f64 = 2.0;
 /// The first and the last interval of a path that ends know no key beyond: their error is as if positions bent this much more.
@@ -89,7 +87,7 @@ fn bend(gbuffer: &GBuffer, grid: &KeyGrid, interval: usize) -> f64 {
             let [a, b, c, d, e] = pixels.map(|pixel| gbuffer.uv[pixel]);
             let axis = |axis: usize| (a[axis] - 4.0 * b[axis] + 6.0 * c[axis] - 4.0 * d[axis] + e[axis]).abs();
             // Twice as long intervals bend sixteen times as much.
-            sum += f64::from(axis(0).max(axis(1)).min(LARGEST / 16.0) * 16.0);
+            sum += f64::from(axis(0).max(axis(1)).min(ANOTHER / 16.0) * 16.0);
             count += 1;
         }
     }

@@ -5,7 +5,7 @@
 //! so the figures do not depend on the number of threads.
 
 use crate::atlas::{Atlas, Label, SourceImage};
-use crate::gbuffer::GBuffer;
+use crate::gbuffer::{GBuffer, difference, size};
 use crate::metrics::{self, Histogram};
 use crate::truth::Truth;
 use cubist_core::fixed::{PLAY_BITS, PlayUv};
@@ -369,7 +369,7 @@ impl Sums {
             for ((&label, &exact), probe) in labels.iter().zip(uvs).zip(&probes) {
                 let at = texels(probe.at);
                 if label == u16::from(probe.label) {
-                    self.path.add((at[0] - exact[0]).abs().max((at[1] - exact[1]).abs()));
+                    self.path.add(size(difference(exact, at)));
                 } else {
                     self.wrong += 1;
                 }
