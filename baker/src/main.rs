@@ -7,8 +7,8 @@ mod cli;
 mod diagnostics;
 
 use anyhow::{Context, Result, anyhow};
+use clap::CommandFactory;
 use clap::error::ErrorKind;
-use clap::{CommandFactory, Parser};
 use cli::{Bake, Cli, Command, Inspect, Playback, Throughput};
 use cubist_baker::inspect::Inspection;
 use cubist_baker::scene::Scene;
@@ -21,7 +21,7 @@ use std::process::ExitCode;
 use std::time::Instant;
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli: Cli = terminal::arguments();
     let result = match (&cli.command, &cli.bake.scene, &cli.bake.output) {
         (Some(Command::Inspect(args)), ..) => inspect(args),
         (Some(Command::Throughput(args)), ..) => throughput(args),

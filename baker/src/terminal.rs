@@ -1,10 +1,27 @@
 //! What programs say: results on standard output, lines for people on standard error; figures and tables as text. Text comes from the programs.
 
 use anyhow::{Context, Result};
+use clap::Parser;
+use clap::error::{ContextKind, ContextValue, ErrorKind as Wrong};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::fmt::Arguments;
 use std::io::{ErrorKind, Write};
 use std::time::Duration;
+
+/// The arguments this program was called with; where they are wrong, it says how and ends.
+#[must_use]
+pub fn arguments<C: Parser>() -> C {
+    C::try_parse().unwrap_or_else(|error| {
+        let command = C::command();
+        // What stands behind a first input is a command to clap, whatever it is.
+        if let (Wrong::ArgumentConflict, Some(ContextValue::String(more))) = (error.kind(), error.get(ContextKind::InvalidSubcommand)) {
+            let names: Vec<_> = command.get_subcommands().map(|command| command.get_name().to_owned()).collect();
+            let said = format!("expected one input, found \"{more}\" too; commands stand before theirs: {}", names.join(", "));
+            command.clone().error(Wrong::ArgumentConflict, said).exit();
+        }
+        error.exit()
+    })
+}
 
 /// Prints `text`, where somebody reads it: who closes a pipe has read enough.
 ///

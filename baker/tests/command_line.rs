@@ -101,6 +101,7 @@ fn memory_is_kept_to_or_what_it_takes_is_said() {
         1,
         "--budget and --ram: expected a bundle of",
     );
+    refused(&bake(dir.path(), "a.obj", &["b.obj", "-o", "a.cubist"]), 2, "expected one input, found \"b.obj\" too");
     for (option, wanted) in [("--ram", "a number of bytes"), ("--budget", "a number of bytes"), ("--psnr", "expected")] {
         refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", option, "-5"]), 2, wanted);
     }

@@ -58,9 +58,19 @@ pub struct Show {
 
 /// The name of a picture that can be written.
 fn picture(name: &str) -> Result<PathBuf, String> {
+    named(name, "png")
+}
+
+/// That of a GIF.
+fn gif(name: &str) -> Result<PathBuf, String> {
+    named(name, "gif")
+}
+
+/// A file's name that ends in what it will be.
+fn named(name: &str, kind: &str) -> Result<PathBuf, String> {
     let path = PathBuf::from(name);
-    let png = path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
-    if png { Ok(path) } else { Err("a PNG is written: expected FILE.png".to_owned()) }
+    let so = path.extension().is_some_and(|end| end.eq_ignore_ascii_case(kind));
+    if so { Ok(path) } else { Err(format!("a {} is written: expected FILE.{kind}", kind.to_uppercase())) }
 }
 
 /// The commands that need no window.
@@ -88,7 +98,7 @@ pub struct Render {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     pub every: u32,
     /// Writes a looping GIF too; a frame of more than 256 colours is reduced to that many.
-    #[arg(long, value_name = "FILE.gif")]
+    #[arg(long, value_name = "FILE.gif", value_parser = gif)]
     pub gif: Option<PathBuf>,
     /// Every pixel becomes a square of N x N.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=16))]

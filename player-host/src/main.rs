@@ -23,10 +23,9 @@ mod transport;
 mod window;
 
 use anyhow::Result;
-use clap::Parser;
 use cli::{Cli, Command, Show, Usage};
 use cubist_baker::files::clean_up_when_interrupted;
-use cubist_baker::terminal::{aligned, print, tell};
+use cubist_baker::terminal::{aligned, arguments, print, tell};
 use cubist_core::Bundle;
 use input::Loaded;
 use picture::Player;
@@ -36,7 +35,7 @@ use std::process::ExitCode;
 use std::time::Duration;
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
+    let cli: Cli = arguments();
     let result = clean_up_when_interrupted().and_then(|()| match &cli.command {
         Some(Command::Render(args)) => {
             args.check()?;

@@ -163,6 +163,8 @@ fn messages_name_the_file_and_the_exit_code_tells_whose_fault_it_is() {
         (vec!["render", "film.cubist", "--out", "o", "--frames", "5..13"], 2, "the bundle, which has frames 0..12"),
         (vec!["render", "film.cubist", "--out", "o", "--frames", "5"], 2, "write A..B"),
         (vec!["render", "film.cubist"], 2, "--out"),
+        (vec!["render", "film.cubist", "--gif", "film.png"], 2, "expected FILE.gif"),
+        (vec!["film.cubist", "other.cubist"], 2, "expected one input, found \"other.cubist\" too"),
     ] {
         let output = run(dir.path(), &arguments);
         let error = String::from_utf8_lossy(&output.stderr);
@@ -175,9 +177,12 @@ fn messages_name_the_file_and_the_exit_code_tells_whose_fault_it_is() {
 #[test]
 fn the_bundle_is_not_written_over() {
     let dir = folder();
-    let output = run(dir.path(), &["render", "film.cubist", "--gif", "./film.cubist"]);
-    assert_eq!(output.status.code(), Some(2), "{}", String::from_utf8_lossy(&output.stderr));
-    assert_eq!(std::fs::read(dir.path().join("film.cubist")).unwrap(), bundle());
+    // However it is called.
+    std::fs::rename(dir.path().join("film.cubist"), dir.path().join("film.gif")).unwrap();
+    let output = run(dir.path(), &["render", "film.gif", "--gif", "./film.gif"]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.code() == Some(2) && !said.contains("expected FILE.gif"), "{said}");
+    assert_eq!(std::fs::read(dir.path().join("film.gif")).unwrap(), bundle());
 }
 
 #[cfg(unix)]
