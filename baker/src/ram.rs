@@ -4,7 +4,9 @@
 //! A player holds five keys where time is cubic and three where it is straight, three rows of nodes where space is cubic, which bend, and two where it is
 //! straight, and fewer layers in either where cells are larger. What each of these loses differs from scene to scene: it is measured.
 
+use crate::atlas;
 use crate::bake::{BakeError, Encoded, Flat, Settings};
+use crate::chart::Choice;
 use crate::climb::{Free, Step, Take, climb};
 use crate::encode::{image_bytes, with_section};
 use crate::inspect::{space_name, time_name};
@@ -16,7 +18,14 @@ use cubist_core::Bundle;
 use cubist_core::format::{PATH, Path, SPACE_LINEAR, TIME_LINEAR};
 
 /// Cells tried, pixels, from the one asked for on.
-const CELLS: [u32; 4] = [4, 8, 16, 32];
+const CELLS: [u32; 4] = [4, 8, 16, LARGEST];
+const LARGEST: u32 = 32;
+/// Intervals at which all of them are tried: the usual one and half of it. Where none fits, shorter ones are with the largest alone.
+const ALL_CELLS: usize = 2;
+/// Where nothing fits, so many times the error that sheets are usually left out at.
+const SPARSER: [f64; 4] = [1.0, 4.0, 16.0, 64.0];
+/// What the memory may cost before other charts are tried, dB.
+const LOST: f64 = 3.0;
 /// Steps tried from the best of what was tried at first.
 const STEPS: usize = 10;
 /// What twice the bytes of the keys have to bring, dB: a third of what sparing asks, since quality within the memory is what is wanted.
@@ -45,8 +54,8 @@ struct Found {
     best: Option<(Value, Tried)>,
     /// Time and space of all that fit.
     fitting: Vec<[u8; 2]>,
-    /// The least memory that a bundle was measured to need.
-    smallest: Option<usize>,
+    /// The least memory that a bundle was measured to need, and its settings.
+    smallest: Option<(usize, Settings)>,
     /// Of the settings that were not tried those that promise the least memory, and how much.
     least: Option<(usize, Settings)>,
     /// What a bundle cannot hold.
@@ -56,54 +65,80 @@ struct Found {
 impl Search<'_> {
     /// The best bundle that plays in `room` bytes of working memory.
     ///
-    /// Straight time, straight space and larger cells than those of the `whole` bundle are tried, each as far as the user left it open, and shorter
-    /// intervals, whose cells see fewer labels, where none of that fits; from the one worth most of those that do, steps lead on: closer keys may well
-    /// make up for what had to go.
+    /// Charts that lost against those of the `whole` bundle get another chance where much is lost, or nothing fits: what bends least in usual cells may
+    /// not do so in large ones.
     ///
     /// # Errors
     /// [`BakeError::Ram`] where nothing fits; whatever flattening and encoding say.
     pub(crate) fn ram(&self, room: usize, whole: Option<Whole>) -> Result<Chosen, BakeError> {
         let asked = whole.map_or(self.options.settings(self.scene.playback.width), |whole| whole.settings);
-        let flat = self.flat(asked.atlas)?;
-        let mut found = Found::default();
-        // Sheets that show little go first, also where they would be worth their bytes.
-        let error = self.prunes(whole.map_or(0.0, |whole| metrics::mse(whole.psnr)));
-        let fewer = Settings { error: error.max(asked.error), ..asked };
-        let shorter = (self.options.key_interval.is_none() && asked.key_interval > 1).then_some(asked.key_interval / 2);
-        for (turn, key_interval) in [Some(asked.key_interval), shorter].into_iter().flatten().enumerate() {
-            for (step, cell) in CELLS.into_iter().filter(|&cell| cell >= asked.cell).enumerate() {
-                self.say(step + CELLS.len() * turn, 2 * CELLS.len());
-                let Some(tried) = self.attempt(&flat, Settings { cell, key_interval, ..fewer }, &mut found)? else { continue };
-                if tried.memory <= room {
-                    // Larger cells only lose.
-                    found.consider(&flat, tried)?;
-                    break;
-                }
-                self.straighten(&flat, &tried, room, &mut found)?;
-            }
-            if found.best.is_some() {
+        let mut flat = self.flat(asked.atlas)?;
+        let mut found = self.within(&flat, asked, room, whole)?;
+        let most = whole.map_or(f64::INFINITY, |whole| whole.psnr);
+        let charts = asked.atlas.charts;
+        for family in charts.tried().filter(|trial| !trial.rewarped && trial.family != charts.family).map(|trial| trial.family) {
+            if found.psnr() >= most - LOST {
                 break;
             }
-        }
-        if let Some((_, settings)) = found.least.filter(|_| found.best.is_none())
-            && let Some(tried) = self.attempt(&flat, settings, &mut found)?
-            && tried.memory <= room
-        {
-            found.consider(&flat, tried)?;
-        }
-        if let Some((value, tried)) = &found.best {
-            let start = (tried.settings, value.worth);
-            self.refine(&flat, start, room, &mut found)?;
+            let atlas = atlas::Settings { charts: Choice { family, rewarped: false, ..charts }, ..asked.atlas };
+            let other = self.flat(atlas)?;
+            let others = self.within(&other, Settings { atlas, ..asked }, room, whole)?;
+            if found.takes(others) {
+                flat = other;
+            }
         }
         let Some((Value { psnr, .. }, tried)) = found.best else {
             return Err(match found.smallest {
-                Some(smallest) => BakeError::Ram { asked: room, smallest, held: self.options.held() },
+                Some((smallest, _)) => BakeError::Ram { asked: room, smallest, held: self.options.held() },
                 // Not a single bundle: what was in the way is the answer.
                 None => found.exceeded.unwrap_or(BakeError::Ram { asked: room, smallest: 0, held: String::new() }),
             });
         };
         let warnings = vec![gave_up(room, &asked, whole, &tried, psnr)];
         Ok(Chosen { flat, encoded: tried.encoded, settings: tried.settings, search_seconds: 0.0, warnings, contested: None })
+    }
+
+    /// What plays in `room` bytes of working memory with the charts of `flat`.
+    ///
+    /// Straight time, straight space and larger cells than those `asked` for are tried, each as far as the user left it open, and shorter intervals, whose
+    /// cells see fewer labels, where none of that fits; from the one worth most of those that do, steps lead on: closer keys may well make up for what had
+    /// to go.
+    fn within(&self, flat: &Flat, asked: Settings, room: usize, whole: Option<Whole>) -> Result<Found, BakeError> {
+        let mut found = Found::default();
+        // Sheets that show little go first, also where they would be worth their bytes.
+        let error = self.prunes(whole.map_or(0.0, |whole| metrics::mse(whole.psnr)));
+        let fewer = Settings { error: error.max(asked.error), ..asked };
+        let shorter = |&interval: &u32| (self.options.key_interval.is_none() && interval > 1).then_some(interval / 2);
+        for (turn, key_interval) in std::iter::successors(Some(asked.key_interval), shorter).enumerate() {
+            let least = if turn < ALL_CELLS { asked.cell } else { LARGEST };
+            for (step, cell) in CELLS.into_iter().filter(|&cell| cell >= least).enumerate() {
+                self.say(step + CELLS.len() * turn.min(ALL_CELLS), (1 + ALL_CELLS) * CELLS.len());
+                let Some(tried) = self.attempt(flat, Settings { cell, key_interval, ..fewer }, &mut found)? else { continue };
+                if tried.memory <= room {
+                    // Larger cells only lose.
+                    found.consider(flat, tried)?;
+                    break;
+                }
+                self.straighten(flat, &tried, room, &mut found)?;
+            }
+            if found.best.is_some() {
+                break;
+            }
+        }
+        for sparser in SPARSER {
+            let Some((_, least)) = found.least.or(found.smallest).filter(|_| found.best.is_none()) else { break };
+            let settings = Settings { error: self.prunes(fewer.error * sparser), ..least };
+            if let Some(tried) = self.attempt(flat, settings, &mut found)?
+                && tried.memory <= room
+            {
+                found.consider(flat, tried)?;
+            }
+        }
+        if let Some((value, tried)) = &found.best {
+            let start = (tried.settings, value.worth);
+            self.refine(flat, start, room, &mut found)?;
+        }
+        Ok(found)
     }
 
     /// Tries what takes less memory than `tried` on the same grid: straight time, straight space, or both.
@@ -151,7 +186,9 @@ impl Search<'_> {
     fn attempt(&self, flat: &Flat, settings: Settings, found: &mut Found) -> Result<Option<Tried>, BakeError> {
         let Some(encoded) = possible(self.encode(flat, &settings), &mut found.exceeded)? else { return Ok(None) };
         let memory = verify::memory(&encoded.bundle)?;
-        found.smallest = Some(found.smallest.map_or(memory, |smallest| smallest.min(memory)));
+        if found.smallest.is_none_or(|(smallest, _)| memory < smallest) {
+            found.smallest = Some((memory, settings));
+        }
         Ok(Some(Tried { settings, encoded, memory }))
     }
 }
@@ -165,6 +202,23 @@ impl Found {
             self.best = Some((value, tried));
         }
         Ok(value)
+    }
+
+    /// Beside exact rays, dB; less than any where nothing fits.
+    fn psnr(&self) -> f64 {
+        self.best.as_ref().map_or(f64::NEG_INFINITY, |(value, _)| value.psnr)
+    }
+
+    /// Takes what `other` charts gave in place of its own where that is worth more, and says so.
+    fn takes(&mut self, other: Self) -> bool {
+        let worth = |found: &Self| found.best.as_ref().map_or(f64::NEG_INFINITY, |(value, _)| value.worth);
+        let better = worth(&other) > worth(self);
+        let smallest = self.smallest.into_iter().chain(other.smallest).min_by_key(|&(memory, _)| memory);
+        if better {
+            *self = other;
+        }
+        self.smallest = smallest;
+        better
     }
 }
 
@@ -185,7 +239,9 @@ fn memory_as(bundle: &[u8], time: u8, space: u8) -> Option<usize> {
 /// What the user should know: how `tried` differs from what was `asked` for, and what that costs. `whole`: the bundle that is too large.
 fn gave_up(room: usize, asked: &Settings, whole: Option<Whole>, tried: &Tried, psnr: f64) -> String {
     let Settings { time, space, cell, key_interval, .. } = tried.settings;
+    let [charts, before] = [tried.settings, *asked].map(|settings| settings.atlas.charts.family);
     let changes = [
+        (charts != before).then(|| format!("--charts {} instead of {}", charts.name(), before.name())),
         (time != asked.time).then(|| format!("--time {} instead of {}", time_name(time), time_name(asked.time))),
         (space != asked.space).then(|| format!("--space {} instead of {}", space_name(space), space_name(asked.space))),
         (tried.settings.error > asked.error).then(|| "sheets left out that show little".to_owned()),
