@@ -3,14 +3,18 @@
 use std::io::Error;
 use std::path::Path;
 
-/// Copies it into `out`; an empty file where none is named.
+/// Copies it into `out`; an empty file where none is named. What no player would play is no bundle: better told here than by a light that flashes.
 pub fn copy(out: &Path) -> Result<(), Error> {
     println!("cargo:rerun-if-env-changed=CUBIST_BUNDLE");
     let bundle = match std::env::var("CUBIST_BUNDLE") {
         Ok(path) => {
             println!("cargo:rerun-if-changed={path}");
             let named = |error: Error| Error::new(error.kind(), format!("CUBIST_BUNDLE={path}: {error}; expected an absolute path"));
-            std::fs::read(&path).map_err(named)?
+            let bytes = std::fs::read(&path).map_err(named)?;
+            // There may be more behind it.
+            cubist_core::Bundle::parse_first(&bytes)
+                .map_err(|error| Error::other(format!("CUBIST_BUNDLE={path}: {error}; bake one with `cubist-bake SCENE -o OUT.cubist`")))?;
+            bytes
         }
         Err(_) => Vec::new(),
     };

@@ -26,7 +26,7 @@ pub(crate) struct Free {
 }
 
 /// One way to change settings: by how many rungs each. `scale`: the key interval is doubled or, below 0, halved that many times.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Step {
     cell: i32,
     scale: i32,

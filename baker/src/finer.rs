@@ -102,15 +102,16 @@ pub(crate) fn crossed(quality: &Brief) -> bool {
     quality.wrong_surface_percent >= TORN && quality.path_error_texels.p99 < BENT
 }
 
-/// By how much the worst frame is worse than the mean, dB, where whole things are missing in it: `wrong` pixels, percent; PSNR, the mean and the worst.
+/// By how much the worst frame is worse than the mean, dB, where whole things are missing in it, or it is far worse: pixels of what is seen that are `wrong`, percent; PSNR, the
+/// mean and the worst.
 pub(crate) fn uneven(wrong: f64, [mean, worst]: [f64; 2]) -> Option<f64> {
-    Some(mean - worst).filter(|off| wrong >= TORN && *off >= PASSING)
+    Some(mean - worst).filter(|&off| wrong >= TORN && off >= PASSING || off >= 2.0 * PASSING)
 }
 
 /// Whether things are lost in some frames that keys close together would show.
 fn passing(quality: &Brief) -> bool {
-    let &Brief { psnr_mean, psnr_min, wrong_surface_percent, path_error_texels } = quality;
-    uneven(wrong_surface_percent, [psnr_mean, psnr_min]).is_some() || wrong_surface_percent >= TORN && path_error_texels.p99 >= FAST
+    let &Brief { psnr_mean, psnr_min, wrong_surface_percent, wrong_seen_percent, path_error_texels } = quality;
+    uneven(wrong_seen_percent, [psnr_mean, psnr_min]).is_some() || wrong_surface_percent >= TORN && path_error_texels.p99 >= FAST
 }
 
 /// Whether many outlines cross cells and positions bend, as on lattices, but nothing says that the path goes fast.
@@ -151,8 +152,10 @@ fn climbs(cell: u32, quality: &Brief, brief: bool) -> (&'static [Climb], &'stati
         true => &[FASTER],
         false if bent >= BENT => &[CLOSER],
         false if bent < STEADY && brief => &[FAR, BRIEFLY],
+        false if bent < STEADY && passing(quality) => &[FASTER, FAR],
         false if bent < STEADY => &[FAR, CLOSE],
         false if brief => &[BRIEFLY],
+        false if passing(quality) => &[FASTER],
         false => &[CLOSE],
     };
     let why = match torn {
@@ -301,7 +304,8 @@ pub(crate) fn choose(
     }
     let Some((_, better)) = trials.better else { return Ok((usual, None)) };
     let why = match why {
-        STEADILY if better.settings.key_interval < usual.settings.key_interval => TURNING,
+        STEADILY if better.settings.key_interval < usual.settings.key_interval && !passing(all) => TURNING,
+        STEADILY if better.settings.key_interval < usual.settings.key_interval => SWEEPING,
         CROSSING if better.settings.key_interval < usual.settings.key_interval => SWEEPING,
         why => why,
     };
@@ -499,12 +503,16 @@ mod tests {
         // So fast that outlines are no matter.
         assert_eq!([tried(8, 20.0, 4.9), tried(8, 20.0, 5.0)], [(1, "surfaces"); 2]);
         // What passes by in some frames is worth a try of keys close together, first.
-        let uneven = |cell, wrong_surface_percent, p99| {
+        let uneven = |[wrong_surface_percent, wrong_seen_percent]: [f64; 2], p99| {
             let path_error_texels = verify::PathError { p99, ..verify::PathError::default() };
-            let quality = Brief { psnr_mean: 30.0, psnr_min: 26.0, wrong_surface_percent, path_error_texels };
-            climbs(cell, &quality, false).0.len()
+            let quality = Brief { psnr_mean: 30.0, psnr_min: 26.0, wrong_surface_percent, wrong_seen_percent, path_error_texels };
+            let (climbs, _) = climbs(8, &quality, false);
+            (climbs.len(), climbs[0].1.contains(&Step::EIGHTH))
         };
-        assert_eq!([uneven(8, 2.0, 0.9), uneven(8, 2.0, 1.0), uneven(8, 2.0, 2.0), uneven(8, 1.9, 2.0)], [3, 2, 1, 1]);
+        assert_eq!([0.9, 1.0, 2.0].map(|p99| uneven([2.0; 2], p99)), [(3, true), (2, true), (1, true)]);
+        // Of what is seen, on much backdrop.
+        assert_eq!([0.9, 1.0, 2.0].map(|p99| uneven([0.2, 2.0], p99)), [(2, true), (1, true), (1, false)]);
+        assert_eq!([0.9, 1.0, 2.0].map(|p99| uneven([0.2, 1.9], p99)), [(2, false), (1, false), (1, false)]);
         // On a brief path closer keys come last, or alone.
         assert_eq!([of(8, 2.0, 0.9, true), of(8, 2.0, 1.0, true), of(8, 2.0, 2.0, true)].map(|of| of.0), [3, 2, 1]);
     }

@@ -171,3 +171,12 @@ pub struct GBuffer {
     /// Coordinates in texels: texel (i, j) covers [i, i + 1) x [j, j + 1). Same order as the labels.
     pub uv: Arc<Vec<[f32; 2]>>,
 }
+
+impl GBuffer {
+    /// As many pixels as `percent` of all are, of those that show more than the backdrop, %: at most 100.
+    #[must_use]
+    pub fn of_seen(&self, percent: f64) -> f64 {
+        let seen = self.label.iter().filter(|&&label| label != 0).count();
+        (percent * self.label.len() as f64 / seen.max(1) as f64).min(100.0)
+    }
+}

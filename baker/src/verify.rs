@@ -80,6 +80,8 @@ pub(crate) struct Brief {
     pub psnr_min: f64,
     /// Share of pixels that show another surface than the exact ray hits, %.
     pub wrong_surface_percent: f64,
+    /// As many of those whose ray hits more than the backdrop, %: what people look at.
+    pub wrong_seen_percent: f64,
     /// How far the played paths are off.
     pub path_error_texels: PathError,
 }
@@ -299,7 +301,8 @@ pub fn against_exact(bytes: &[u8], atlas: &Atlas, progress: &(dyn Fn(u32, u32) +
 pub(crate) fn briefly(bytes: &[u8], image: &SourceImage, gbuffer: &GBuffer) -> Result<Brief, VerifyError> {
     let Quality { psnr_mean, psnr_min, wrong_surface_percent, path_error_texels, .. } =
         compare(bytes, (image, gbuffer), false, &|_, _| {})?;
-    Ok(Brief { psnr_mean, psnr_min, wrong_surface_percent, path_error_texels })
+    let wrong_seen_percent = gbuffer.of_seen(wrong_surface_percent);
+    Ok(Brief { psnr_mean, psnr_min, wrong_surface_percent, wrong_seen_percent, path_error_texels })
 }
 
 /// The figures of both; SSIM and bilinear lookup are left out unless `all` are asked for.

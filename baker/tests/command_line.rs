@@ -91,6 +91,19 @@ fn a_folder_of_diagnostics_shows_one_bake() {
 }
 
 #[test]
+fn what_was_found_can_be_had_without_trials() {
+    let dir = folder();
+    let told = |options: &[&str]| String::from_utf8(bake(dir.path(), "a.obj", &[&["-o", "a.cubist"], options].concat()).stdout).unwrap();
+    let wanted = |text: &str, name: &str| text.lines().find(|line| line.starts_with(name)).map(str::to_owned);
+    let tried = told(&[]);
+    let found = wanted(&tried, "again, sooner").unwrap();
+    let (_, options) = found.split_once("the same options and ").unwrap();
+    let again = told(&options.split(' ').collect::<Vec<_>>());
+    assert_eq!(wanted(&again, "again"), None, "there is nothing left to try");
+    assert_eq!(["grid", "PSNR"].map(|name| wanted(&again, name)), ["grid", "PSNR"].map(|name| wanted(&tried, name)));
+}
+
+#[test]
 fn memory_is_kept_to_or_what_it_takes_is_said() {
     let dir = folder();
     refused(&bake(dir.path(), "a.obj", &["-o", "a.cubist", "--ram", "1K"]), 1, "--ram: expected room for ");

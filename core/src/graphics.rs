@@ -17,7 +17,8 @@ use embedded_graphics_core::pixelcolor::Rgb565;
 use embedded_graphics_core::pixelcolor::raw::RawU16;
 use embedded_graphics_core::primitives::Rectangle;
 
-/// A way to draw row `y` of a player's current frame: [`Player::row`], say, or [`Player::fine_row`].
+/// A way to draw row `y` of a player's current frame: [`Player::row`], say, or [`Player::fine_row`]. A list of ways for more than one player is of closures,
+/// `|player, y, row| player.fine_row(y, row)`: the lifetime of a method's name is that of one player's memory.
 pub type DrawRow<'a, T> = fn(&mut Player<'a, T>, u32, &mut [u16]);
 
 /// The current frame of a player, drawn row by row: those rows, from their left ends on, that the target shows some of.

@@ -110,7 +110,8 @@ impl<'a, T: Texels> Player<'a, T> {
     /// decoded as many leaves the coming key to the frames after it. A frame shown again decodes nothing.
     ///
     /// So playing backwards takes several times as long as forwards: a step back past a key decodes anew from an independent one, up to
-    /// [`Limits::seek_keys`] keys in that call. Bundles baked with `--independent-every 4` are some per cent larger and take half of that. A knob whose
+    /// [`Limits::seek_keys`] keys in that call. So does the first frame of a looping bundle whose time is cubic: it needs the last key
+    /// too, and all that this follows from. Bundles baked with `--independent-every 4` are some per cent larger and take half of that. A knob whose
     /// readings waver wants some slack, lest it goes back and forth over a key.
     #[inline]
     pub fn seek(&mut self, frame: Frame) {

@@ -160,7 +160,7 @@ impl ApplicationHandler for App<'_> {
     fn window_event(&mut self, events: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
         let now = self.now();
         match event {
-            WindowEvent::CloseRequested => events.exit(),
+            WindowEvent::CloseRequested | WindowEvent::Destroyed => events.exit(),
             WindowEvent::RedrawRequested => {
                 let drawn = self.draw(events);
                 self.fail_on(drawn, events);

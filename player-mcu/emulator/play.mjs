@@ -1,4 +1,5 @@
-// Runs the Pico's firmware in an emulator and holds every frame that its display shows, pixel for pixel, against the host's.
+// Runs the Pico's firmware in an emulator and holds every frame that its display shows, pixel for pixel, against the host's. In this folder, once `npm ci`
+// has fetched the emulator:
 //
 //   node play.mjs --firmware ELF --display st7789|ili9341 --frames FILE --size WxH [--bundle FILE] [--stops N] [--run N] [--png DIR]
 //

@@ -135,4 +135,22 @@ fn tell_playing(report: &Report, rows: &mut Rows) {
             seconds.total, seconds.load, seconds.rays, seconds.atlas, seconds.encode, seconds.paint, seconds.verify
         ),
     );
+    if !report.source_image.trials.is_empty() || report.grid.why.is_some() || !report.grid.spaces.is_empty() {
+        rows.add("again, sooner", format!("the same options and {}", found(report)));
+    }
+}
+
+/// What trials have found, as options: who gives them has it without trials.
+fn found(report: &Report) -> String {
+    let Report { grid, source_image: image, .. } = report;
+    let rewarp = if image.rewarped { "on" } else { "off" };
+    let outline = if image.outline > 1 { format!(" --outline {}", image.outline) } else { String::new() };
+    format!(
+        "--cell {} --key-interval {} --time {} --space {} --charts {} --rewarp {rewarp}{outline}",
+        grid.cell,
+        grid.key_interval,
+        grid.time,
+        grid.space,
+        image.candidate.name()
+    )
 }

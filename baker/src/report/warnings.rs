@@ -8,6 +8,8 @@ use crate::verify::Quality;
 const COARSE: f64 = 0.7;
 /// From this share of pixels on, %, left-out surfaces are worth a warning.
 const DROPPED_PERCENT: f64 = 0.01;
+/// From as many of those that show the scene on, %, it can be seen that things are not whole.
+const PARTS_PERCENT: f64 = 2.0;
 /// Where a larger share of the pixels that show the scene is lost, %, smaller cells alone are no cure.
 const LOST_PERCENT: f64 = 25.0;
 
@@ -17,7 +19,8 @@ pub(super) fn of(origin: &Origin<'_>, quality: &Quality) -> Vec<String> {
         [surfaces(origin, quality.wrong_surface_percent), source_image(origin), shared_labels(origin), crossed(origin), still(origin)]
             .into_iter()
             .flatten();
-    origin.scene.warnings.iter().cloned().chain(own).chain(missing(quality, closest(origin))).collect()
+    let wrong = origin.flat.atlas.gbuffer.of_seen(quality.wrong_surface_percent);
+    origin.scene.warnings.iter().cloned().chain(own).chain(missing(quality, wrong, closest(origin))).collect()
 }
 
 /// Surfaces that are not shown, because they are too small on the screen.
@@ -27,7 +30,7 @@ fn surfaces(origin: &Origin<'_>, wrong: f64) -> Option<String> {
     let share = |of: u64| 100.0 * encoded.dropped_pixels as f64 / of.max(1) as f64;
     let dropped = share(flat.rays);
     // Of those that show more than the backdrop.
-    let lost = share(flat.atlas.gbuffer.label.iter().filter(|&&label| label != 0).count() as u64);
+    let lost = flat.atlas.gbuffer.of_seen(dropped);
     if lost > LOST_PERCENT {
         return Some(format!(
             "{lost:.0} % of what the camera sees of the scene is not shown: its surfaces are too small on the screen for cells of {cell} x {cell} pixels; \
@@ -39,11 +42,12 @@ fn surfaces(origin: &Origin<'_>, wrong: f64) -> Option<String> {
         true => (", or is not worth its bytes there", format!("--sheets all keeps more of them; {cure}")),
         false => ("", cure.to_owned()),
     };
+    let parts = if lost >= PARTS_PERCENT { "things lose parts: " } else { "" };
     // What else is wrong is outlines that keys and cells do not follow.
     let all = if wrong > 1.5 * dropped { format!(" ({wrong:.2} % show a wrong surface in all)") } else { String::new() };
     (dropped > DROPPED_PERCENT).then(|| {
         format!(
-            "{dropped:.2} % of the pixels show a neighbour because their own surface is left out{all}: a cell of {cell} x {cell} pixels x {interval} frames \
+            "{parts}{dropped:.2} % of the pixels show a neighbour because their own surface is left out{all}: a cell of {cell} x {cell} pixels x {interval} frames \
              leaves out what covers too little of it{or}; {cure}"
         )
     })
@@ -113,9 +117,9 @@ fn still(origin: &Origin<'_>) -> Option<String> {
     (play.looping && play.frames == 1).then(|| "a looping path of one frame shows a single picture".to_owned())
 }
 
-/// A frame in which whole things are missing.
-fn missing(quality: &Quality, interval: u32) -> Option<String> {
-    let off = uneven(quality.wrong_surface_percent, [quality.psnr_mean, quality.psnr_min])?;
+/// A frame in which whole things are missing. `wrong`: pixels of what is seen, percent.
+fn missing(quality: &Quality, wrong: f64, interval: u32) -> Option<String> {
+    let off = uneven(wrong, [quality.psnr_mean, quality.psnr_min])?;
     let cure = if interval > 1 { "--key-interval 1 keeps most of it" } else { "a slower path, or more --frames, keeps it" };
     Some(format!(
         "frame {} is {off:.1} dB worse than the mean: what shows for a few frames only, as things that sweep past the camera do, is missing there; {cure}",
@@ -136,15 +140,9 @@ mod tests {
 
     #[test]
     fn what_is_missing_in_a_frame_is_told() {
-        let quality = |psnr_min, wrong_surface_percent| Quality {
-            psnr_mean: 30.0,
-            psnr_min,
-            worst_frame: 7,
-            wrong_surface_percent,
-            ..Quality::default()
-        };
-        assert!(missing(&quality(25.0, 3.0), 8).unwrap().starts_with("frame 7 is 5.0 dB worse"));
-        assert!(missing(&quality(25.0, 3.0), 1).unwrap().contains("--frames"));
-        assert!(missing(&quality(25.0, 1.0), 8).is_none() && missing(&quality(27.0, 3.0), 8).is_none());
+        let quality = |psnr_min| Quality { psnr_mean: 30.0, psnr_min, worst_frame: 7, ..Quality::default() };
+        assert!(missing(&quality(25.0), 3.0, 8).unwrap().starts_with("frame 7 is 5.0 dB worse"));
+        assert!(missing(&quality(25.0), 3.0, 1).unwrap().contains("--frames"));
+        assert!(missing(&quality(25.0), 1.0, 8).is_none() && missing(&quality(27.0), 3.0, 8).is_none());
     }
 }
