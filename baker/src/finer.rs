@@ -102,8 +102,8 @@ pub(crate) fn crossed(quality: &Brief) -> bool {
     quality.wrong_surface_percent >= TORN && quality.path_error_texels.p99 < BENT
 }
 
-/// By how much the worst frame is worse than the mean, dB, where whole things are missing in it, or it is far worse: pixels of what is seen that are `wrong`, percent; PSNR, the
-/// mean and the worst.
+/// By how much the worst frame is worse than the mean, dB, where whole things are missing in it, or it is worse by far: pixels of what is seen that are
+/// `wrong`, percent; PSNR, the mean and the worst.
 pub(crate) fn uneven(wrong: f64, [mean, worst]: [f64; 2]) -> Option<f64> {
     Some(mean - worst).filter(|&off| wrong >= TORN && off >= PASSING || off >= 2.0 * PASSING)
 }

@@ -81,7 +81,8 @@ impl Search<'_> {
                 break;
             }
             let atlas = atlas::Settings { charts: Choice { family, rewarped: false, ..charts }, ..asked.atlas };
-            let other = self.flat(atlas)?;
+            // What could be cut at half the size may be too much at the whole.
+            let Ok(other) = self.flat(atlas) else { continue };
             let others = self.within(&other, Settings { atlas, ..asked }, room, whole)?;
             if found.takes(others) {
                 flat = other;
@@ -125,9 +126,11 @@ impl Search<'_> {
                 break;
             }
         }
-        for sparser in SPARSER {
-            let Some((_, least)) = found.least.or(found.smallest).filter(|_| found.best.is_none()) else { break };
-            let settings = Settings { error: self.prunes(fewer.error * sparser), ..least };
+        // Where all sheets are asked for, there is nothing to leave out.
+        for sparser in SPARSER.into_iter().take(if fewer.error > 0.0 { SPARSER.len() } else { 1 }) {
+            let promising = found.least.into_iter().chain(found.smallest).min_by_key(|&(memory, _)| memory);
+            let Some((_, least)) = promising.filter(|_| found.best.is_none()) else { break };
+            let settings = Settings { error: fewer.error * sparser, ..least };
             if let Some(tried) = self.attempt(flat, settings, &mut found)?
                 && tried.memory <= room
             {

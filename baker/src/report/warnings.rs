@@ -13,6 +13,9 @@ const PARTS_PERCENT: f64 = 2.0;
 /// Where a larger share of the pixels that show the scene is lost, %, smaller cells alone are no cure.
 const LOST_PERCENT: f64 = 25.0;
 
+/// A worst frame from here on, dB, is nothing to speak of.
+const GOOD: f64 = 34.0;
+
 /// What the scene's loader warned of, and the pipeline itself.
 pub(super) fn of(origin: &Origin<'_>, quality: &Quality) -> Vec<String> {
     let own =
@@ -119,7 +122,7 @@ fn still(origin: &Origin<'_>) -> Option<String> {
 
 /// A frame in which whole things are missing. `wrong`: pixels of what is seen, percent.
 fn missing(quality: &Quality, wrong: f64, interval: u32) -> Option<String> {
-    let off = uneven(wrong, [quality.psnr_mean, quality.psnr_min])?;
+    let off = uneven(wrong, [quality.psnr_mean, quality.psnr_min]).filter(|_| quality.psnr_min < GOOD)?;
     let cure = if interval > 1 { "--key-interval 1 keeps most of it" } else { "a slower path, or more --frames, keeps it" };
     Some(format!(
         "frame {} is {off:.1} dB worse than the mean: what shows for a few frames only, as things that sweep past the camera do, is missing there; {cure}",
@@ -144,5 +147,7 @@ mod tests {
         assert!(missing(&quality(25.0), 3.0, 8).unwrap().starts_with("frame 7 is 5.0 dB worse"));
         assert!(missing(&quality(25.0), 3.0, 1).unwrap().contains("--frames"));
         assert!(missing(&quality(25.0), 1.0, 8).is_none() && missing(&quality(27.0), 3.0, 8).is_none());
+        assert!(missing(&quality(22.0), 0.1, 8).is_some(), "it is worse by far");
+        assert!(missing(&Quality { psnr_mean: 44.0, ..quality(35.0) }, 3.0, 8).is_none(), "and good enough");
     }
 }
