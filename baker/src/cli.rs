@@ -224,8 +224,9 @@ pub struct Bake {
     /// source-image.png: with the charts' borders; mask.png: its covered texels; never-seen.png: covered texels that no pixel of any frame falls
     /// on, in magenta; density.png: texels a pixel where a surface is seen closest, over what was asked for, from a quarter (blue: too coarse)
     /// to four times that (red: more than needed). frame-NNNN-exact.png, -played.png and -compare.png: cast, played, and both with their
-    /// difference four times as strong; frame-NNNN-rays.png: where the frame's rays fall in the source image, with the key-ray grid's corners
-    /// and lines between those that see one surface.
+    /// difference four times as strong, each in the source image's colours; frame-NNNN-scene.png: the antialiased scene in its own;
+    /// frame-NNNN-rays.png: where the frame's rays fall in the source image, with the key-ray grid's corners and lines between those that see one
+    /// surface.
     #[arg(long, value_name = "DIR")]
     pub diagnostics: Option<PathBuf>,
     /// Frames compared with the antialiased scene: a number (evenly spread over the path), all, or none.

@@ -68,7 +68,7 @@ fn bake(name: &str, output: &Path, args: &Bake) -> Result<()> {
         files::write(path, (baked.report.json() + "\n").as_bytes())?;
     }
     if let Some(folder) = &args.diagnostics {
-        diagnostics::write(folder, &baked)?;
+        diagnostics::write(folder, &scene, &baked)?;
     }
     if args.quiet {
         return Ok(());

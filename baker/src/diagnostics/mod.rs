@@ -10,12 +10,13 @@ use anyhow::{Context, Result};
 use cubist_baker::atlas::SourceImage;
 use cubist_baker::files::write_png;
 use cubist_baker::job::Baked;
-use cubist_baker::truth::spread;
+use cubist_baker::scene::Scene;
+use cubist_baker::truth::{Truth, spread};
 use cubist_baker::verify;
 use std::path::Path;
 
 /// What is shown of a frame: what the names of its pictures end in.
-const KINDS: [&str; 4] = ["exact", "played", "compare", "rays"];
+const KINDS: [&str; 5] = ["exact", "played", "compare", "rays", "scene"];
 /// Frames shown exact and played.
 const FRAMES: u32 = 3;
 /// How much stronger than it is a difference is shown.
@@ -23,9 +24,9 @@ const GAIN: u8 = 4;
 /// The colour of the charts' borders.
 const BORDER: [u8; 3] = [255, 0, 255];
 /// Writes into `folder`: source-image.png, mask.png, never-seen.png and density.png; for three frames and the worst one frame-NNNN-exact.png,
-/// frame-NNNN-played.png, frame-NNNN-compare.png (exact, played, their difference four times as strong) and frame-NNNN-rays.png. Pictures of other frames,
-/// which an earlier bake left there, are removed.
-pub fn write(folder: &Path, baked: &Baked) -> Result<()> {
+/// frame-NNNN-played.png, frame-NNNN-compare.png (exact, played, their difference four times as strong), frame-NNNN-rays.png and frame-NNNN-scene.png: the
+/// antialiased `scene`, which knows nothing of the source image's colours. Pictures of other frames, which an earlier bake left there, are removed.
+pub fn write(folder: &Path, scene: &Scene, baked: &Baked) -> Result<()> {
     let (flat, report) = (&baked.flat, &baked.report);
     let image = &flat.atlas.image;
     write_png(&folder.join("source-image.png"), image.width, &bordered(image))?;
@@ -36,19 +37,21 @@ pub fn write(folder: &Path, baked: &Baked) -> Result<()> {
     let asked = report.source_image.density * report.source_image.scale;
     maps::density(image, &seen, asked).write(&folder.join("density.png"))?;
     let gbuffer = &flat.atlas.gbuffer;
+    let truth = Truth::new(scene);
     let mut result = Ok(());
     let mut frames = spread(gbuffer.frames, FRAMES);
     frames.push(report.quality.worst_frame);
     frames.sort_unstable();
     frames.dedup();
     verify::play(&baked.bundle, &frames, |frame, played| {
-        let [exact_name, played_name, compare_name, rays_name] = KINDS.map(|kind| folder.join(name(frame, kind)));
+        let [exact_name, played_name, compare_name, rays_name, scene_name] = KINDS.map(|kind| folder.join(name(frame, kind)));
         let write = || {
             let exact = verify::exact_frame(&flat.atlas, frame);
             write_png(&exact_name, gbuffer.width, &exact)?;
             write_png(&played_name, gbuffer.width, played)?;
             let difference: Vec<u8> = exact.iter().zip(played).map(|(a, b)| a.abs_diff(*b).saturating_mul(GAIN)).collect();
             write_png(&compare_name, gbuffer.width * 3, &side_by_side(gbuffer.width, [&exact, played, &difference]))?;
+            write_png(&scene_name, gbuffer.width, &truth.frame(frame))?;
             rays::draw(flat, frame, report.grid.cell).write(&rays_name)
         };
         if result.is_ok() {
@@ -119,6 +122,7 @@ fn side_by_side(width: u32, pictures: [&[u8]; 3]) -> Vec<u8> {
 mod tests {
     use super::picture::SIDE;
     use super::*;
+    use cubist_baker::metrics;
     use cubist_baker::scene::builtin;
     use cubist_baker::{Options, TruthFrames, job};
 
@@ -130,7 +134,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let earlier = folder.path().join(name(5, "exact"));
         std::fs::write(&earlier, "earlier").expect("a file");
-        write(folder.path(), &baked).expect("pictures");
+        write(folder.path(), &scene, &baked).expect("pictures");
         assert!(!earlier.exists(), "there are five frames");
         let image = &baked.flat.atlas.image;
         let tall = image.height * SIDE / image.width;
@@ -141,7 +145,7 @@ mod tests {
             ("density".to_owned(), [SIDE, tall + maps::LEGEND]),
         ];
         for frame in [0, 2, 4] {
-            let kinds = [("exact", [64, 48]), ("played", [64, 48]), ("compare", [192, 48]), ("rays", [SIDE, tall])];
+            let kinds = [("exact", [64, 48]), ("played", [64, 48]), ("compare", [192, 48]), ("rays", [SIDE, tall]), ("scene", [64, 48])];
             sizes.extend(kinds.map(|(kind, size)| (format!("frame-{frame:04}-{kind}"), size)));
         }
         let open = |name: &str| image::open(folder.path().join(format!("{name}.png"))).expect(name).into_rgb8();
@@ -149,6 +153,10 @@ mod tests {
             let picture = open(&name);
             assert_eq!([picture.width(), picture.height()], size, "{name}");
         }
+        // Of one scene, but not of the same colours.
+        let [exact, truth] = ["exact", "scene"].map(|kind| open(&format!("frame-0002-{kind}")));
+        let off = metrics::psnr(metrics::mean_squared_error(&exact, &truth));
+        assert!((20.0..50.0).contains(&off), "{off} dB");
         // Counted from the G-buffer alone.
         let mut hidden = image.covered.to_vec();
         for uv in baked.flat.atlas.gbuffer.uv.iter() {
