@@ -3,7 +3,7 @@
 use std::io::Error;
 use std::path::Path;
 
-/// Copies it into `out`; an empty file where none is named. What no player would play is no bundle: better told here than by a light that flashes.
+/// Copies it into `out`; an empty file where none is named. What is no bundle is better told here than by a light that flashes.
 pub fn copy(out: &Path) -> Result<(), Error> {
     println!("cargo:rerun-if-env-changed=CUBIST_BUNDLE");
     let bundle = match std::env::var("CUBIST_BUNDLE") {

@@ -211,9 +211,10 @@ pub struct Bake {
     /// Playing takes at most this many bytes of working memory (also 48K), at the best quality that does.
     ///
     /// A bundle that needs no more stays as it is. Else linear --time, linear --space, larger cells and closer keys are tried, each unless it is
-    /// given (a given cell may grow all the same), and from what fits on to what is worth more; what was given up is said at the end. A row of
-    /// pixels comes on top: two bytes each. Where flash is short as well, --budget goes with it, and --psnr where quality is given: both keep a given
-    /// cell, and search linear --time and --space beside the rest.
+    /// given (a given cell may grow all the same), and from what fits on to what is worth more; where much is lost other --charts too, and where
+    /// nothing fits more sheets are left out. What was given up is said at the end. A row of pixels comes on top: two bytes each. Where flash is
+    /// short as well, --budget goes with it, and --psnr where quality is given: both keep a given cell, and search linear --time and --space beside
+    /// the rest.
     #[arg(long, value_name = "BYTES", value_parser = budget, allow_negative_numbers = true)]
     pub ram: Option<u64>,
     /// Writes bytes, seconds, quality and warnings as JSON.

@@ -31,7 +31,7 @@ use crate::verify::Brief;
 use std::cmp::Ordering;
 
 /// Wrong pixels, percent, from which on smaller cells are worth a try. Most scenes have a tenth of that.
-const TORN: f64 = 2.0;
+pub(crate) const TORN: f64 = 2.0;
 /// Texels that a pixel in a hundred is off by, from which on closer keys are worth a try, and keys farther apart are not. Most scenes have a half to
 /// three quarters of that.
 const BENT: f64 = 2.0;
@@ -63,6 +63,8 @@ const FAST: f64 = 5.0;
 /// So much worse than the mean, dB, is the worst frame where something passes close by the camera between two keys: whole things are missing there for a
 /// frame or two, and a key a frame brings them back. Lattices, which are wrong everywhere, have a half of that.
 const PASSING: f64 = 4.0;
+/// A frame from here on, dB, is good enough, whatever others are.
+const GOOD: f64 = 34.0;
 /// Paths of at most as many frames mostly go fast: closer keys are tried there whatever crosses cells, down to one a frame, and with larger cells. They are
 /// few, and a trial takes little time.
 pub(crate) const BRIEF: u32 = 64;
@@ -105,7 +107,7 @@ pub(crate) fn crossed(quality: &Brief) -> bool {
 /// By how much the worst frame is worse than the mean, dB, where whole things are missing in it, or it is worse by far: pixels of what is seen that are
 /// `wrong`, percent; PSNR, the mean and the worst.
 pub(crate) fn uneven(wrong: f64, [mean, worst]: [f64; 2]) -> Option<f64> {
-    Some(mean - worst).filter(|&off| wrong >= TORN && off >= PASSING || off >= 2.0 * PASSING)
+    Some(mean - worst).filter(|&off| worst < GOOD && (wrong >= TORN && off >= PASSING || off >= 2.0 * PASSING))
 }
 
 /// Whether things are lost in some frames that keys close together would show.

@@ -173,7 +173,7 @@ pub struct GBuffer {
 }
 
 impl GBuffer {
-    /// As many pixels as `percent` of all are, of those that show more than the backdrop, %: at most 100.
+    /// A share of all pixels, `percent`, as a share of those that show more than the backdrop, at most 100 %.
     #[must_use]
     pub fn of_seen(&self, percent: f64) -> f64 {
         let seen = self.label.iter().filter(|&&label| label != 0).count();

@@ -76,7 +76,14 @@ fn bake(name: &str, output: &Path, args: &Bake) -> Result<()> {
     for warning in &baked.report.warnings {
         tell(format_args!("warning: {name}: {warning}"));
     }
-    print(&aligned(&report::table(&baked.report)))
+    let mut rows = report::table(&baked.report);
+    // A search for a goal chooses more than options can say.
+    if options.goal.is_none()
+        && let Some(found) = report::sooner(&baked.report)
+    {
+        rows.push(("sooner".to_owned(), format!("much the same without trials, as far as not given yet: {found}")));
+    }
+    print(&aligned(&rows))
 }
 
 /// What scenes are read from beside models, by the ends of their files' names.

@@ -181,6 +181,7 @@ impl Options {
         let all = [
             (cells && self.cell.is_some(), "--cell"),
             (self.key_interval.is_some(), "--key-interval"),
+            (!cells && self.all_sheets, "--sheets"),
             (memory && self.time.is_some(), "--time"),
             (memory && self.space.is_some(), "--space"),
             (memory && self.storage == Some(Storage::Packed), "--storage"),

@@ -23,9 +23,13 @@ const LARGEST: u32 = 32;
 /// Intervals at which all of them are tried: the usual one and half of it. Where none fits, shorter ones are with the largest alone.
 const ALL_CELLS: usize = 2;
 /// Where nothing fits, so many times the error that sheets are usually left out at.
-const SPARSER: [f64; 4] = [1.0, 4.0, 16.0, 64.0];
+const SPARSER: [f64; 3] = [4.0, 16.0, 64.0];
+/// That error where no bundle tells it, as a picture's PSNR, dB.
+const FAIR: f64 = 30.0;
 /// What the memory may cost before other charts are tried, dB.
 const LOST: f64 = 3.0;
+/// What other charts have to be worth more, dB: either are held against exact rays through their own source image.
+const CLEARLY: f64 = 0.5;
 /// Steps tried from the best of what was tried at first.
 const STEPS: usize = 10;
 /// What twice the bytes of the keys have to bring, dB: a third of what sparing asks, since quality within the memory is what is wanted.
@@ -76,11 +80,13 @@ impl Search<'_> {
         let mut found = self.within(&flat, asked, room, whole)?;
         let most = whole.map_or(f64::INFINITY, |whole| whole.psnr);
         let charts = asked.atlas.charts;
-        for family in charts.tried().filter(|trial| !trial.rewarped && trial.family != charts.family).map(|trial| trial.family) {
+        // Each family was tried as it is first; the winner perhaps rewarped after that.
+        let rewarped = self.options.rewarp.unwrap_or(false);
+        for family in charts.tried().filter(|trial| trial.rewarped == rewarped && trial.family != charts.family).map(|trial| trial.family) {
             if found.psnr() >= most - LOST {
                 break;
             }
-            let atlas = atlas::Settings { charts: Choice { family, rewarped: false, ..charts }, ..asked.atlas };
+            let atlas = atlas::Settings { charts: Choice { family, rewarped, ..charts }, ..asked.atlas };
             // What could be cut at half the size may be too much at the whole.
             let Ok(other) = self.flat(atlas) else { continue };
             let others = self.within(&other, Settings { atlas, ..asked }, room, whole)?;
@@ -126,15 +132,14 @@ impl Search<'_> {
                 break;
             }
         }
-        // Where all sheets are asked for, there is nothing to leave out.
-        for sparser in SPARSER.into_iter().take(if fewer.error > 0.0 { SPARSER.len() } else { 1 }) {
+        if let Some((_, settings)) = found.least {
+            self.last_resort(flat, settings, room, &mut found)?;
+        }
+        let error = if fewer.error > 0.0 { fewer.error } else { self.prunes(metrics::mse(FAIR)) };
+        for sparser in SPARSER.into_iter().filter(|_| error > 0.0) {
             let promising = found.least.into_iter().chain(found.smallest).min_by_key(|&(memory, _)| memory);
-            let Some((_, least)) = promising.filter(|_| found.best.is_none()) else { break };
-            let settings = Settings { error: fewer.error * sparser, ..least };
-            if let Some(tried) = self.attempt(flat, settings, &mut found)?
-                && tried.memory <= room
-            {
-                found.consider(flat, tried)?;
+            if let Some((_, least)) = promising {
+                self.last_resort(flat, Settings { error: error * sparser, ..least }, room, &mut found)?;
             }
         }
         if let Some((value, tried)) = &found.best {
@@ -142,6 +147,17 @@ impl Search<'_> {
             self.refine(flat, start, room, &mut found)?;
         }
         Ok(found)
+    }
+
+    /// Tries `settings` if nothing fits so far.
+    fn last_resort(&self, flat: &Flat, settings: Settings, room: usize, found: &mut Found) -> Result<(), BakeError> {
+        if found.best.is_none()
+            && let Some(tried) = self.attempt(flat, settings, found)?
+            && tried.memory <= room
+        {
+            found.consider(flat, tried)?;
+        }
+        Ok(())
     }
 
     /// Tries what takes less memory than `tried` on the same grid: straight time, straight space, or both.
@@ -212,10 +228,10 @@ impl Found {
         self.best.as_ref().map_or(f64::NEG_INFINITY, |(value, _)| value.psnr)
     }
 
-    /// Takes what `other` charts gave in place of its own where that is worth more, and says so.
+    /// Takes what `other` charts gave in place of its own where that is clearly worth more, and says so.
     fn takes(&mut self, other: Self) -> bool {
         let worth = |found: &Self| found.best.as_ref().map_or(f64::NEG_INFINITY, |(value, _)| value.worth);
-        let better = worth(&other) > worth(self);
+        let better = worth(&other) > worth(self) + CLEARLY;
         let smallest = self.smallest.into_iter().chain(other.smallest).min_by_key(|&(memory, _)| memory);
         if better {
             *self = other;
@@ -272,6 +288,7 @@ fn gave_up(room: usize, asked: &Settings, whole: Option<Whole>, tried: &Tried, p
 mod tests {
     use super::*;
     use crate::atlas::Storage;
+    use crate::chart::Family;
     use crate::job::bake_scene;
     use crate::options::{Goal, Options, TruthFrames};
     use crate::report::Report;
@@ -349,6 +366,32 @@ mod tests {
         let (_, bytes, report) = bake(Some(straight * 9 / 10), Options::default()).unwrap();
         assert!(kind(&bytes).2 > 3 && report.grid.cell > 8, "{:?}", kind(&bytes));
         assert!(report.warnings.iter().any(|warning| warning.contains("instead of 8")), "{:?}", report.warnings);
+    }
+
+    #[test]
+    fn sheets_and_charts_give_way_before_a_room_is_refused() {
+        let mut scene = builtin::build("round-columns").unwrap();
+        (scene.playback.width, scene.playback.height, scene.playback.frames) = (64, 48, 9);
+        // Charts are tried where the scene brings none.
+        scene.triangles.iter_mut().for_each(|triangle| triangle.island = None);
+        let made = |room, options| {
+            let options = Options { goal: Some(Goal::Ram(room)), truth: TruthFrames::None, ..options };
+            bake_scene(&scene, &options, &|_, _| {}).map(|(_, report)| report)
+        };
+        let least = |options| match made(1_000, options) {
+            Err(error @ BakeError::Ram { smallest, .. }) => (smallest, error.to_string()),
+            other => panic!("contexts alone take more: {:?}", other.map(|report| report.memory.workspace)),
+        };
+        let ((all, said), (fewer, _)) = (least(Options { all_sheets: true, ..Options::default() }), least(Options::default()));
+        assert!(fewer < all && said.ends_with("or leave --sheets to the search"), "{fewer} {all} {said}");
+        let given = Options { charts: Some(Family::Planes.into()), ..Options::default() };
+        let (planes, _) = least(given);
+        assert!(fewer <= planes, "{fewer} {planes}");
+        let report = made(fewer, Options::default()).unwrap();
+        assert_eq!(report.memory.workspace, fewer, "what is named can be had");
+        // What the user sets stays.
+        let report = made(planes, given).unwrap();
+        assert_eq!((report.memory.workspace, report.source_image.candidate), (planes, Family::Planes));
     }
 
     #[test]

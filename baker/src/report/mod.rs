@@ -17,7 +17,7 @@ use cubist_core::format::{ATLAS, LABELS, MASK, SPACE_LINEAR, TexelKind};
 use serde::{Deserialize, Serialize};
 
 pub(crate) use origin::Origin;
-pub use table::table;
+pub use table::{sooner, table};
 
 /// Seconds by stage, wall clock.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]

@@ -1,7 +1,7 @@
 //! What the user should know of a bundle: what it does not show, and what to do about that. Figures come from the report's own origin.
 
 use super::origin::Origin;
-use crate::finer::uneven;
+use crate::finer::{TORN, uneven};
 use crate::verify::Quality;
 
 /// Below this share of the resolution asked for, the source image is called too small.
@@ -12,9 +12,6 @@ const DROPPED_PERCENT: f64 = 0.01;
 const PARTS_PERCENT: f64 = 2.0;
 /// Where a larger share of the pixels that show the scene is lost, %, smaller cells alone are no cure.
 const LOST_PERCENT: f64 = 25.0;
-
-/// A worst frame from here on, dB, is nothing to speak of.
-const GOOD: f64 = 34.0;
 
 /// What the scene's loader warned of, and the pipeline itself.
 pub(super) fn of(origin: &Origin<'_>, quality: &Quality) -> Vec<String> {
@@ -122,12 +119,13 @@ fn still(origin: &Origin<'_>) -> Option<String> {
 
 /// A frame in which whole things are missing. `wrong`: pixels of what is seen, percent.
 fn missing(quality: &Quality, wrong: f64, interval: u32) -> Option<String> {
-    let off = uneven(wrong, [quality.psnr_mean, quality.psnr_min]).filter(|_| quality.psnr_min < GOOD)?;
+    let off = uneven(wrong, [quality.psnr_mean, quality.psnr_min])?;
     let cure = if interval > 1 { "--key-interval 1 keeps most of it" } else { "a slower path, or more --frames, keeps it" };
-    Some(format!(
-        "frame {} is {off:.1} dB worse than the mean: what shows for a few frames only, as things that sweep past the camera do, is missing there; {cure}",
-        quality.worst_frame
-    ))
+    let what = match wrong >= TORN {
+        true => "what shows for a few frames only, as things that sweep past the camera do, is missing there",
+        false => "what moves most from key to key is out of place there",
+    };
+    Some(format!("frame {} is {off:.1} dB worse than the mean: {what}; {cure}", quality.worst_frame))
 }
 
 #[cfg(test)]
@@ -147,7 +145,7 @@ mod tests {
         assert!(missing(&quality(25.0), 3.0, 8).unwrap().starts_with("frame 7 is 5.0 dB worse"));
         assert!(missing(&quality(25.0), 3.0, 1).unwrap().contains("--frames"));
         assert!(missing(&quality(25.0), 1.0, 8).is_none() && missing(&quality(27.0), 3.0, 8).is_none());
-        assert!(missing(&quality(22.0), 0.1, 8).is_some(), "it is worse by far");
+        assert!(missing(&quality(22.0), 0.1, 8).unwrap().contains("out of place"));
         assert!(missing(&Quality { psnr_mean: 44.0, ..quality(35.0) }, 3.0, 8).is_none(), "and good enough");
     }
 }
