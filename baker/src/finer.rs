@@ -113,6 +113,7 @@ pub(crate) fn uneven(wrong: f64, [mean, worst]: [f64; 2]) -> Option<f64> {
 /// Whether things are lost in some frames that keys close together would show.
 fn passing(quality: &Brief) -> bool {
     let &Brief { psnr_mean, psnr_min, wrong_surface_percent, wrong_seen_percent, path_error_texels } = quality;
+    // Things that pass are missing from what is seen, however little that is; a path that goes fast tears whole pictures.
     uneven(wrong_seen_percent, [psnr_mean, psnr_min]).is_some() || wrong_surface_percent >= TORN && path_error_texels.p99 >= FAST
 }
 

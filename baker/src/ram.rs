@@ -108,8 +108,8 @@ impl Search<'_> {
     /// What plays in `room` bytes of working memory with the charts of `flat`.
     ///
     /// Straight time, straight space and larger cells than those `asked` for are tried, each as far as the user left it open, and shorter intervals, whose
-    /// cells see fewer labels, where none of that fits; from the one worth most of those that do, steps lead on: closer keys may well make up for what had
-    /// to go.
+    /// cells see fewer labels, where none of that fits; where that does not either, what promised to take least, with fewer and fewer sheets. From the one worth
+    /// most of those that fit, steps lead on: closer keys may well make up for what had to go.
     fn within(&self, flat: &Flat, asked: Settings, room: usize, whole: Option<Whole>) -> Result<Found, BakeError> {
         let mut found = Found::default();
         // Sheets that show little go first, also where they would be worth their bytes.
@@ -149,7 +149,7 @@ impl Search<'_> {
         Ok(found)
     }
 
-    /// Tries `settings` if nothing fits so far.
+    /// Tries `settings`, if nothing fits so far.
     fn last_resort(&self, flat: &Flat, settings: Settings, room: usize, found: &mut Found) -> Result<(), BakeError> {
         if found.best.is_none()
             && let Some(tried) = self.attempt(flat, settings, found)?

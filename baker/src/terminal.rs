@@ -1,4 +1,5 @@
-//! What programs say: results on standard output, lines for people on standard error; figures and tables as text. Text comes from the programs.
+//! What programs are told, and say: arguments; results on standard output, lines for people on standard error; figures and tables as text. What the text says
+//! comes from the programs.
 
 use anyhow::{Context, Result};
 use clap::Parser;
@@ -12,12 +13,12 @@ use std::time::Duration;
 #[must_use]
 pub fn arguments<C: Parser>() -> C {
     C::try_parse().unwrap_or_else(|error| {
-        let command = C::command();
-        // What stands behind a first input is a command to clap, whatever it is.
+        let mut command = C::command();
+        // To clap, what stands behind a first input is a command, whatever it is.
         if let (Wrong::ArgumentConflict, Some(ContextValue::String(more))) = (error.kind(), error.get(ContextKind::InvalidSubcommand)) {
             let names: Vec<_> = command.get_subcommands().map(|command| command.get_name().to_owned()).collect();
             let said = format!("expected one input, found \"{more}\" too; commands stand before theirs: {}", names.join(", "));
-            command.clone().error(Wrong::ArgumentConflict, said).exit();
+            command.error(Wrong::ArgumentConflict, said).exit();
         }
         error.exit()
     })
