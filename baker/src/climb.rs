@@ -6,7 +6,7 @@ use crate::spare::LAMBDAS;
 use cubist_core::format::{SPACE_CUBIC, SPACE_LINEAR, TIME_CUBIC, TIME_LINEAR};
 
 /// Cells, pixels; key intervals, frames: the rungs that steps lead to, and those of [`LAMBDAS`].
-const CELLS: [u32; 4] = [4, 8, 16, 32];
+pub(crate) const CELLS: [u32; 4] = [4, 8, 16, 32];
 const INTERVALS: [u32; 14] = [1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 24, 32, 48, 64];
 /// The longest interval between keys, frames.
 const LONGEST: u32 = 256;

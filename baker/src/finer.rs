@@ -306,10 +306,10 @@ pub(crate) fn choose(
         climb((closer, back), &free, (Take::First, &[Step::HALF]), BACK_TRIES, |settings| trials.gain(settings))?;
     }
     let Some((_, better)) = trials.better else { return Ok((usual, None)) };
+    let closer = better.settings.key_interval < usual.settings.key_interval;
     let why = match why {
-        STEADILY if better.settings.key_interval < usual.settings.key_interval && !passing(all) => TURNING,
-        STEADILY if better.settings.key_interval < usual.settings.key_interval => SWEEPING,
-        CROSSING if better.settings.key_interval < usual.settings.key_interval => SWEEPING,
+        STEADILY if closer && !passing(all) => TURNING,
+        STEADILY | CROSSING if closer => SWEEPING,
         why => why,
     };
     Ok((better, Some(Other { why, usual })))

@@ -7,7 +7,7 @@
 use crate::atlas;
 use crate::bake::{BakeError, Encoded, Flat, Settings};
 use crate::chart::Choice;
-use crate::climb::{Free, Step, Take, climb};
+use crate::climb::{CELLS, Free, Step, Take, climb};
 use crate::encode::{image_bytes, with_section};
 use crate::inspect::{space_name, time_name};
 use crate::metrics;
@@ -17,10 +17,9 @@ use crate::verify;
 use cubist_core::Bundle;
 use cubist_core::format::{PATH, Path, SPACE_LINEAR, TIME_LINEAR};
 
-/// Cells tried, pixels, from the one asked for on.
-const CELLS: [u32; 4] = [4, 8, 16, LARGEST];
-const LARGEST: u32 = 32;
-/// Intervals at which all of them are tried: the usual one and half of it. Where none fits, shorter ones are with the largest alone.
+/// The largest cells tried, pixels.
+const LARGEST: u32 = CELLS[CELLS.len() - 1];
+/// Intervals at which all cells from those asked for on are tried: the usual one and half of it. Where none fits, shorter ones are with the largest alone.
 const ALL_CELLS: usize = 2;
 /// Where nothing fits, so many times the error that sheets are usually left out at.
 const SPARSER: [f64; 3] = [4.0, 16.0, 64.0];
@@ -132,32 +131,20 @@ impl Search<'_> {
                 break;
             }
         }
-        if let Some((_, settings)) = found.least {
-            self.last_resort(flat, settings, room, &mut found)?;
+        if let Some((_, settings)) = found.least.filter(|_| found.best.is_none()) {
+            self.fitting(flat, settings, room, &mut found)?;
         }
         let error = if fewer.error > 0.0 { fewer.error } else { self.prunes(metrics::mse(FAIR)) };
         for sparser in SPARSER.into_iter().filter(|_| error > 0.0) {
             let promising = found.least.into_iter().chain(found.smallest).min_by_key(|&(memory, _)| memory);
-            if let Some((_, least)) = promising {
-                self.last_resort(flat, Settings { error: error * sparser, ..least }, room, &mut found)?;
-            }
+            let Some((_, least)) = promising.filter(|_| found.best.is_none()) else { break };
+            self.fitting(flat, Settings { error: error * sparser, ..least }, room, &mut found)?;
         }
         if let Some((value, tried)) = &found.best {
             let start = (tried.settings, value.worth);
             self.refine(flat, start, room, &mut found)?;
         }
         Ok(found)
-    }
-
-    /// Tries `settings`, if nothing fits so far.
-    fn last_resort(&self, flat: &Flat, settings: Settings, room: usize, found: &mut Found) -> Result<(), BakeError> {
-        if found.best.is_none()
-            && let Some(tried) = self.attempt(flat, settings, found)?
-            && tried.memory <= room
-        {
-            found.consider(flat, tried)?;
-        }
-        Ok(())
     }
 
     /// Tries what takes less memory than `tried` on the same grid: straight time, straight space, or both.
@@ -179,11 +166,7 @@ impl Search<'_> {
                 }
                 continue;
             }
-            if let Some(tried) = self.attempt(flat, settings, found)?
-                && tried.memory <= room
-            {
-                found.consider(flat, tried)?;
-            }
+            self.fitting(flat, settings, room, found)?;
         }
         Ok(())
     }
@@ -195,10 +178,15 @@ impl Search<'_> {
         climb(start, &free, (Take::First, &Step::ALL), STEPS, |settings| {
             self.say(step, STEPS);
             step += 1;
-            let Some(tried) = self.attempt(flat, *settings, found)?.filter(|tried| tried.memory <= room) else { return Ok(None) };
-            found.consider(flat, tried).map(|value| Some(value.worth))
+            Ok(self.fitting(flat, *settings, room, found)?.map(|value| value.worth))
         })?;
         Ok(())
+    }
+
+    /// Makes a bundle, the best if it is, and says what it is good for; `None` where it does not fit, or no bundle can hold it.
+    fn fitting(&self, flat: &Flat, settings: Settings, room: usize, found: &mut Found) -> Result<Option<Value>, BakeError> {
+        let Some(tried) = self.attempt(flat, settings, found)?.filter(|tried| tried.memory <= room) else { return Ok(None) };
+        found.consider(flat, tried).map(Some)
     }
 
     /// Makes a bundle; `None` where no bundle can hold it.

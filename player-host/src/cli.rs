@@ -43,7 +43,7 @@ pub struct Show {
     #[arg(long)]
     pub headless: bool,
     /// Writes what the window shows at picture N (--frames, else the first) as a PNG, then exits.
-    #[arg(long, value_name = "FILE.png", value_parser = picture)]
+    #[arg(long, value_name = "FILE.png", value_parser = |name: &str| named(name, "png"))]
     pub shot: Option<PathBuf>,
     /// Shows N pictures, one frame after the other, then exits.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
@@ -54,16 +54,6 @@ pub struct Show {
     /// The window opens with N screen pixels to a pixel of the picture; left out: as many as fit the screen.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=16))]
     pub scale: Option<u32>,
-}
-
-/// The name of a picture that can be written.
-fn picture(name: &str) -> Result<PathBuf, String> {
-    named(name, "png")
-}
-
-/// That of a GIF.
-fn gif(name: &str) -> Result<PathBuf, String> {
-    named(name, "gif")
 }
 
 /// A file's name that ends in what it will be.
@@ -98,7 +88,7 @@ pub struct Render {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..))]
     pub every: u32,
     /// Writes a looping GIF too; a frame of more than 256 colours is reduced to that many.
-    #[arg(long, value_name = "FILE.gif", value_parser = gif)]
+    #[arg(long, value_name = "FILE.gif", value_parser = |name: &str| named(name, "gif"))]
     pub gif: Option<PathBuf>,
     /// Every pixel becomes a square of N x N.
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=16))]

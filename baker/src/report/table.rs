@@ -145,7 +145,7 @@ pub fn sooner(report: &Report) -> Option<String> {
     let tried = !image.trials.is_empty() || grid.why.is_some() || !grid.spaces.is_empty() || !image.outlines.is_empty();
     let rewarp = if image.rewarped { "on" } else { "off" };
     let outline = if image.outlines.is_empty() { String::new() } else { format!(" --outline {}", image.outline) };
-    let options = || {
+    tried.then(|| {
         format!(
             "--cell {} --key-interval {} --time {} --space {} --charts {} --rewarp {rewarp}{outline}",
             grid.cell,
@@ -154,6 +154,5 @@ pub fn sooner(report: &Report) -> Option<String> {
             grid.space,
             image.candidate.name()
         )
-    };
-    tried.then(options)
+    })
 }

@@ -27,8 +27,7 @@ pub(super) fn of(origin: &Origin<'_>, quality: &Quality) -> Vec<String> {
 fn surfaces(origin: &Origin<'_>, wrong: f64) -> Option<String> {
     let Origin { flat, encoded, settings, .. } = origin;
     let (cell, interval) = (settings.cell, closest(origin));
-    let share = |of: u64| 100.0 * encoded.dropped_pixels as f64 / of.max(1) as f64;
-    let dropped = share(flat.rays);
+    let dropped = 100.0 * encoded.dropped_pixels as f64 / flat.rays.max(1) as f64;
     // Of those that show more than the backdrop.
     let lost = flat.atlas.gbuffer.of_seen(dropped);
     if lost > LOST_PERCENT {
