@@ -3,6 +3,7 @@
 use crate::atlas::Storage;
 use crate::bake::{Flat, Settings};
 use crate::report::Report;
+use cubist_core::format::TexelKind;
 
 /// A finished job.
 pub struct Baked {
@@ -16,6 +17,6 @@ pub struct Baked {
     pub settings: Settings,
     /// Mean PSNR against exact rays before texels were coloured by what is played, dB.
     pub(crate) psnr_before: f64,
-    /// Whether the search that found it leaves room for what is baked where nothing is asked for: how that has to be stored.
-    pub(crate) contested: Option<Storage>,
+    /// Whether the search that found it leaves room for what is baked where nothing is asked for: how that has to be stored, and of which texels.
+    pub(crate) contested: Option<(Storage, TexelKind)>,
 }

@@ -10,15 +10,18 @@ use crate::samples::Samples;
 use crate::terminal::grouped;
 use crate::tune::{Chosen, DENSITIES, MOST_MEMORY, STEPS, Search, possible};
 use crate::verify;
+use cubist_core::format::TexelKind;
 
 /// What a bit is worth at first in the search for a budget.
 const BUDGET_LAMBDA: f32 = 0.1;
 /// Source images tried, at most.
 const IMAGES: usize = 1 + DENSITIES.len();
-/// Bundles that fit the budget and are measured, before the best of them is bettered step by step.
+/// Bundles that fit the budget and are measured, of each kind of texels, before the best of them is bettered step by step.
 const TRIES: usize = 4;
 /// How far a predicted size may lie over the budget and still be tried: coarser keys take less.
 const SLACK: f64 = 1.15;
+/// What texels of half a byte have to bring where whole ones fit too, dB: a device draws them slower, and its player has to be one for them.
+const HALVES: f64 = 0.1;
 
 /// A source image, measured.
 struct Image {
@@ -32,9 +35,11 @@ struct Image {
     error: f64,
 }
 
-/// What of `source` says how fine the image is.
-fn fineness(source: &atlas::Settings) -> [f64; 2] {
-    [source.density, source.detail]
+/// What of its settings says how fine a source image is.
+type Fineness = ([f64; 2], TexelKind);
+
+fn fineness(source: &atlas::Settings) -> Fineness {
+    ([source.density, source.detail], source.texels)
 }
 
 impl Image {
@@ -67,10 +72,10 @@ impl Image {
 /// The source images that a search for a budget has to choose from.
 struct Images {
     all: Vec<Image>,
-    /// The finest that leaves room for keys, or else the coarsest: keys are measured at this one.
+    /// The finest that leaves room for keys, or else the coarsest, of the first kind of texels: keys are measured at this one.
     reference: Flat,
-    /// Bytes of the one that is as fine as asked for; packed, if that is left to the search.
-    usual: (usize, Option<usize>),
+    /// Of each kind of texels, bytes of the one that is as fine as asked for; packed, if that is left to the search.
+    usual: Vec<(TexelKind, usize, Option<usize>)>,
 }
 
 /// A way to code keys, measured at one source image.
@@ -89,7 +94,7 @@ impl Search<'_> {
     ///
     /// Source images and grids are measured apart, then the sums of their bytes and of their errors say which pairs to bake.
     pub(crate) fn budget(&self, budget: u64) -> Result<Chosen, BakeError> {
-        let steps = IMAGES + self.grids(self.options.source()).len() + TRIES + STEPS;
+        let steps = self.kinds().len() * (IMAGES + TRIES) + self.grids(self.options.source()).len() + STEPS;
         let samples = Samples::new(self.cast);
         let Images { all: images, reference, usual } = self.images(budget, &samples, steps)?;
         let keys = self.keys(&reference, &samples, steps)?;
@@ -104,28 +109,46 @@ impl Search<'_> {
         let base = self.options.settings(self.scene.playback.width);
         let own = keys.iter().find(|keys| (keys.settings.cell, keys.settings.key_interval) == (base.cell, base.key_interval));
         let fits = |image: usize| (image + own.map_or(0, |own| own.bytes / 2)) as u64 <= budget;
-        let contested = match usual {
-            (bytes, _) if fits(bytes) => Some(base.atlas.storage),
-            (_, Some(packed)) if fits(packed) => Some(Storage::Packed),
+        let contested = usual.into_iter().find(|&(kind, ..)| kind == chosen.settings.atlas.texels).and_then(|usual| match usual {
+            (kind, bytes, _) if fits(bytes) => Some((base.atlas.storage, kind)),
+            (kind, _, Some(packed)) if fits(packed) => Some((Storage::Packed, kind)),
             _ => None,
-        };
+        });
         Ok(Chosen { contested, ..chosen })
     }
 
-    /// Measures source images, the finest first, but for those that are far too large for `budget`.
+    /// The kinds of texels to try.
+    fn kinds(&self) -> Vec<TexelKind> {
+        let asked = self.options.source().texels;
+        let halves = self.options.texels.is_none() && asked == TexelKind::Indexed8;
+        if halves { vec![asked, TexelKind::Indexed4] } else { vec![asked] }
+    }
+
+    /// What texels of `kind` have to bring beside those asked for, dB.
+    fn price(&self, kind: TexelKind) -> f64 {
+        if kind == self.options.source().texels { 0.0 } else { HALVES }
+    }
+
+    /// Measures source images, kind by kind of texels and the finest first, but for those that are far too large for `budget`.
     fn images(&self, budget: u64, samples: &Samples, steps: usize) -> Result<Images, BakeError> {
         let room = usize::try_from(budget).unwrap_or(usize::MAX);
         let asked = self.options.source();
-        let (mut images, mut reference, mut usual): (Vec<Image>, _, _) = (Vec::new(), None, None);
+        let (mut images, mut reference, mut usual): (Vec<Image>, _, _) = (Vec::new(), None, Vec::new());
         let all = self.options.detail.is_none().then_some((f64::INFINITY, 1.0));
+        let each = |texels| {
+            all.into_iter().chain(DENSITIES.map(|ratio| (asked.detail, ratio))).map(move |(detail, ratio)| (texels, detail, ratio))
+        };
         let mut scale = 1.0;
-        for (step, (detail, ratio)) in all.into_iter().chain(DENSITIES.map(|ratio| (asked.detail, ratio))).enumerate() {
+        for (step, (texels, detail, ratio)) in self.kinds().into_iter().flat_map(each).enumerate() {
             self.say(step, steps);
-            let source = atlas::Settings { density: asked.density * scale * ratio, detail, ..asked };
+            if ratio == 1.0 {
+                scale = 1.0;
+            }
+            let source = atlas::Settings { density: asked.density * scale * ratio, detail, texels, ..asked };
             let coarsest = ratio == DENSITIES[DENSITIES.len() - 1];
             let finer = |last: &Image| source.density / last.source.density;
             if let Some(last) = images.last()
-                && last.source.detail == detail
+                && (last.source.detail, last.source.texels) == (detail, texels)
                 && !coarsest
                 && last.least() as f64 * finer(last) * finer(last) > 1.5 * room as f64
             {
@@ -137,7 +160,7 @@ impl Search<'_> {
             if detail == asked.detail && ratio == 1.0 {
                 // Where the image is full, densities above what it holds change nothing.
                 scale = flat.atlas.figures.scale.min(1.0);
-                usual = Some((bytes, packed));
+                usual.push((texels, bytes, packed));
             }
             let unpacked = raw_bytes(&flat.atlas.image);
             let image = Image { source, bytes, packed, unpacked, error: samples.of_image(&flat.atlas) };
@@ -149,10 +172,8 @@ impl Search<'_> {
                 images.push(image);
             }
         }
-        match (reference, usual) {
-            (Some(reference), Some(usual)) => Ok(Images { all: images, reference, usual }),
-            _ => Err(BakeError::Budget { budget, smallest: u64::MAX }),
-        }
+        let reference = reference.ok_or(BakeError::Budget { budget, smallest: u64::MAX })?;
+        Ok(Images { all: images, reference, usual })
     }
 
     /// Measures every way to code keys at one source image.
@@ -162,7 +183,7 @@ impl Search<'_> {
         let packed = asked.storage == Storage::Packed;
         let (mut keys, mut exceeded) = (Vec::<Keys>::new(), None);
         for mut settings in self.grids(asked) {
-            self.say(IMAGES + keys.len(), steps);
+            self.say(self.kinds().len() * IMAGES + keys.len(), steps);
             settings.coding = settings.coding.worth(BUDGET_LAMBDA);
             // The last grid's error is about this one's, and a little more.
             settings.error = self.prunes(keys.last().map_or(0.0, |keys| keys.error));
@@ -177,11 +198,12 @@ impl Search<'_> {
 
     /// Bakes the `pairs` that promise most until enough of them fit, and steps on from the best.
     fn best_pair(&self, budget: u64, pairs: &[(&Image, &Keys)], samples: &Samples, steps: usize) -> Result<Chosen, BakeError> {
-        let mut current: Option<([f64; 2], Flat)> = None;
+        let mut current: Option<(Fineness, Flat)> = None;
         let mut exceeded = None;
-        let mut best: Option<(Settings, f64)> = None;
+        // Of each kind of texels the best.
+        let mut starts: Vec<(Settings, f64)> = Vec::new();
         let (limits, mut nearest) = (self.options.limits(), (u64::MAX, 0, 0));
-        let (mut fitting, mut room) = (0, MOST_MEMORY);
+        let (mut fitting, mut room) = (Vec::new(), MOST_MEMORY);
         // Of bundles that fit the better one counts, of those that do not the smaller one: from there steps may lead to one that does.
         let mut score = |flat: &Flat, settings: &Settings, first: bool| -> Result<Option<f64>, BakeError> {
             let Some(Encoded { bundle, .. }) = possible(self.encode(flat, settings), &mut exceeded)? else { return Ok(None) };
@@ -203,10 +225,11 @@ impl Search<'_> {
         let least = pairs.clone().map(|(image, keys)| image.with(keys, budget).0).min().unwrap_or(0);
         for (image, keys) in pairs {
             let (predicted, source) = image.with(keys, budget);
-            if fitting == TRIES || (predicted as f64 > budget as f64 * SLACK && predicted > least) {
+            let tried = fitting.iter().filter(|&&kind| kind == source.texels).count();
+            if tried == TRIES || (predicted as f64 > budget as f64 * SLACK && predicted > least) {
                 continue;
             }
-            self.say(steps - STEPS - TRIES + fitting, steps);
+            self.say(steps - STEPS - self.kinds().len() * TRIES + fitting.len(), steps);
             let flat = match current.take() {
                 Some((fine, flat)) if fine == fineness(&image.source) => flat,
                 _ => self.flat(image.source)?,
@@ -216,17 +239,15 @@ impl Search<'_> {
             let found = score(&flat, &settings, true)?;
             current = Some((fineness(&image.source), flat));
             let Some(found) = found else { continue };
-            fitting += usize::from(found > 0.0);
-            if best.is_none_or(|(_, most)| found > most) {
-                best = Some((settings, found));
+            fitting.extend((found > 0.0).then_some(source.texels));
+            match starts.iter_mut().find(|(settings, _)| settings.atlas.texels == source.texels) {
+                Some(best) if found <= best.1 => {}
+                Some(best) => *best = (settings, found),
+                None => starts.push((settings, found)),
             }
         }
-        let Some(start) = best else {
+        let Some((start, flat)) = self.better(&starts, current, samples)? else {
             return Err(exceeded.unwrap_or(BakeError::Budget { budget, smallest: u64::MAX }));
-        };
-        let flat = match current {
-            Some((fine, flat)) if fine == fineness(&start.0.atlas) => flat,
-            _ => self.flat(start.0.atlas)?,
         };
         // Coarser coding is what makes a bundle fit.
         let free = Free { lambda: false, ..self.free() };
@@ -245,6 +266,56 @@ impl Search<'_> {
         }
         self.finish(flat, settings, Vec::new())
     }
+
+    /// The better one of `starts`, and its source image, which `current` may be: of those that fit by their painted colours, since 16 colours leave
+    /// painting less to gain.
+    fn better(
+        &self,
+        starts: &[(Settings, f64)],
+        current: Option<(Fineness, Flat)>,
+        samples: &Samples,
+    ) -> Result<Option<((Settings, f64), Flat)>, BakeError> {
+        let flat = |settings: &Settings| {
+            // Laid out as the one that was tried, however it is stored.
+            self.flat(atlas::Settings { storage: self.options.source().storage, ..settings.atlas })
+        };
+        if starts.len() > 1 && starts.iter().all(|&(_, found)| found > 0.0) {
+            drop(current);
+            let mut best: Option<(f64, (Settings, f64), Flat)> = None;
+            for &(settings, found) in starts {
+                let flat = flat(&settings)?;
+                let psnr = self.painted(&flat, &settings, samples)? - self.price(settings.atlas.texels);
+                if best.as_ref().is_none_or(|&(most, ..)| psnr > most) {
+                    best = Some((psnr, (settings, found), flat));
+                }
+            }
+            return Ok(best.map(|(_, start, flat)| (start, flat)));
+        }
+        let Some(&start) = starts.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else { return Ok(None) };
+        let flat = match current {
+            Some((fine, flat)) if fine == fineness(&start.0.atlas) => flat,
+            _ => flat(&start.0)?,
+        };
+        Ok(Some((start, flat)))
+    }
+
+    /// The mean PSNR against the truth of what `settings` make of `flat`, dB, in the colours that it gets in the end.
+    fn painted(&self, flat: &Flat, settings: &Settings, samples: &Samples) -> Result<f64, BakeError> {
+        let Encoded { bundle, .. } = self.encode(flat, settings)?;
+        let painted = match self.painter {
+            Some(painter) => painter.painted(&bundle, &flat.atlas.image, &settings.atlas)?,
+            None => None,
+        };
+        Ok(samples.of_bundle(painted.as_ref().map_or(&bundle, |(painted, _)| painted))?.1)
+    }
+}
+
+/// What the user should know where texels are half a byte for the sake of `budget`.
+pub(crate) fn halved(budget: u64) -> String {
+    format!(
+        "--budget {budget}: texels are half a byte, of 16 colours: a firmware's player of them is a Player<Indexed4> or Player<AnyTexels>; --texels 8 \
+         keeps whole bytes, at lower quality"
+    )
 }
 
 /// What the user should know where the source image is packed for the sake of `budget`, and takes so many bytes of memory.
@@ -306,6 +377,33 @@ mod tests {
         let (_, wide) = bake(Some(Goal::Budget(plain.len() as u64 * 4)), None);
         assert!(wide.source_image.storage == Storage::Raw && !told(&wide));
         assert!(psnr(&wide) >= psnr(&usual), "{} {}", psnr(&wide), psnr(&usual));
+    }
+
+    #[test]
+    fn texels_are_half_a_byte_where_that_shows_more() {
+        let mut scene = small("street");
+        // As fine as charts are told to be.
+        scene.triangles.iter_mut().for_each(|triangle| triangle.island = None);
+        let bake = |goal, texels| {
+            let charts = Some(crate::chart::Family::Planes.into());
+            let options =
+                Options { goal, texels, charts, storage: Some(Storage::Raw), cell: Some(8), truth: TruthFrames::All, ..Options::default() };
+            bake_scene(&scene, &options, &|_, _| {}).unwrap()
+        };
+        let (plain, usual) = bake(None, None);
+        assert_eq!(usual.source_image.texels, TexelKind::Indexed8);
+        let tight = Some(Goal::Budget(plain.len() as u64 * 52 / 100));
+        let told = |report: &crate::Report| report.warnings.iter().any(|warning| warning.contains("--texels 8"));
+        let psnr = |report: &crate::Report| report.quality_vs_truth.unwrap().psnr_mean;
+        let (bytes, open) = bake(tight, None);
+        assert!(open.source_image.texels == TexelKind::Indexed4 && told(&open), "{:?}", open.warnings);
+        assert!(bytes.len() <= plain.len() * 52 / 100);
+        let (_, held) = bake(tight, Some(TexelKind::Indexed8));
+        assert!(held.source_image.texels == TexelKind::Indexed8 && !told(&held));
+        assert!(psnr(&open) > psnr(&held), "{} {}", psnr(&open), psnr(&held));
+        // Where there is room for whole ones, a little more is not worth a player of another kind.
+        let (_, wide) = bake(Some(Goal::Budget(plain.len() as u64 * 4)), None);
+        assert!(wide.source_image.texels == TexelKind::Indexed8 && !told(&wide));
     }
 
     #[test]

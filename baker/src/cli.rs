@@ -125,12 +125,13 @@ pub struct Bake {
     /// A scene that brings a flattening of its own, as built-in ones do, keeps its texels. With --budget the search may keep all, unless this is given.
     #[arg(long, value_name = "WORTH")]
     pub detail: Option<Detail>,
-    /// What a texel of the source image is, and so what it costs.
+    /// What a texel of the source image is, and so what it costs [default: 8].
     ///
     /// A player names the kinds it plays in its type: Player of Indexed8 (which Player alone means), of Indexed4, of Direct565, or of
-    /// AnyTexels; a firmware links the code of no others. All kinds are stored --storage raw or packed.
-    #[arg(long, value_enum, value_name = "BITS", default_value_t = Texels::Eight)]
-    pub texels: Texels,
+    /// AnyTexels; a firmware links the code of no others. All kinds are stored --storage raw or packed. With --budget the search may take 4 where 8 do not
+    /// fit or show less, unless this is given.
+    #[arg(long, value_enum, value_name = "BITS")]
+    pub texels: Option<Texels>,
     /// Colours of the source image, at most, 2 to 256; at most 16 with --texels 4, none with 565 [default: 256; 16 with --texels 4].
     ///
     /// They are chosen for what is seen, in Oklab, and rounded to what an RGB565 display shows. Fewer save next to nothing raw, but pack better.
@@ -309,10 +310,12 @@ impl Bake {
     #[must_use]
     pub fn clash(&self) -> Option<String> {
         match (self.texels, self.colours?) {
-            (Texels::Four, colours @ 17..) => Some(format!(
+            (Some(Texels::Four), colours @ 17..) => Some(format!(
                 "--colours {colours}: expected at most 16, which is what --texels 4 can tell apart; lower it, or use --texels 8"
             )),
-            (Texels::Direct, _) => Some("--colours: --texels 565 has no palette to limit; leave it out, or use --texels 8".to_owned()),
+            (Some(Texels::Direct), _) => {
+                Some("--colours: --texels 565 has no palette to limit; leave it out, or use --texels 8".to_owned())
+            }
             _ => None,
         }
     }
@@ -338,11 +341,12 @@ impl Bake {
             Charts::Own => Some(Family::Own),
         };
         let storage = |storage| if storage == Storage::Raw { atlas::Storage::Raw } else { atlas::Storage::Packed };
-        let texels = match self.texels {
+        let kind = |texels| match texels {
             Texels::Eight => TexelKind::Indexed8,
             Texels::Four => TexelKind::Indexed4,
             Texels::Direct => TexelKind::Direct565,
         };
+        let texels = self.texels.map(kind);
         let space = |space| if space == Space::Linear { SPACE_LINEAR } else { SPACE_CUBIC };
         let options = Options {
             cell: self.cell,
@@ -353,8 +357,7 @@ impl Bake {
             source: atlas::Settings {
                 max_side: self.atlas,
                 density: self.density,
-                texels,
-                colours: self.colours.map_or(texels.colours(), usize::from),
+                colours: self.colours.map_or(texels.unwrap_or_default().colours(), usize::from),
                 outline: match self.outline {
                     Outlines::Auto => None,
                     Outlines::One => Some(0),
@@ -364,6 +367,7 @@ impl Bake {
                 ..atlas::Settings::default()
             },
             detail: self.detail.map(|Detail(worth)| worth),
+            texels,
             storage: self.storage.map(storage),
             charts: charts.map(Into::into),
             rewarp: match self.rewarp {

@@ -11,6 +11,7 @@ use crate::chart::{self, Choice, Family};
 use crate::choose;
 use crate::fewer;
 use crate::finer;
+use crate::halves;
 use crate::inspect::Inspection;
 use crate::made::Made;
 use crate::options::{Goal, Options, TruthFrames};
@@ -24,6 +25,7 @@ use crate::trace::Tracer;
 use crate::truth::{Truth, spread};
 use crate::tune::{self, Chosen, Whole};
 use crate::{usual, verify};
+use cubist_core::format::TexelKind;
 use std::time::Instant;
 
 /// Keys that trials of charts have, at least, on paths with as many frames; on brief ones twice as many.
@@ -62,11 +64,12 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
     let choice = choice(tracer, options, progress)?;
     let options = &Options { charts: Some(choice), ..*options };
     let mut baked = toward(tracer, options, progress)?;
-    if let Some(budget) = options.limits().bytes
-        && baked.settings.atlas.storage != options.source().storage
-    {
+    if let Some(budget) = options.limits().bytes {
+        let (asked, used) = (options.source(), baked.settings.atlas);
+        let halved = (used.texels != asked.texels).then(|| budget::halved(budget));
         // By what it takes with the outline that was chosen for it.
-        baked.report.warnings.push(budget::packed(budget, baked.report.memory.picture));
+        let packed = (used.storage != asked.storage).then(|| budget::packed(budget, baked.report.memory.picture));
+        baked.report.warnings.extend(halved.into_iter().chain(packed));
     }
     // Whatever was not for this bundle was for finding it.
     let (seconds, total) = (&mut baked.report.seconds, options.load_seconds + tracer.seconds + start.elapsed().as_secs_f64());
@@ -77,11 +80,11 @@ fn by(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<
 
 /// Like [`by`], of charts that are chosen. What is baked where nothing is asked for is the answer where it is as good a one.
 fn toward(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Result<Baked, BakeError> {
-    let usual = |storage| once(tracer, &Options { goal: None, storage, ..*options }, None, progress);
+    let usual = |storage, texels| once(tracer, &Options { goal: None, storage, texels, ..*options }, None, progress);
     let Some(goal) = options.goal else { return once(tracer, options, None, progress) };
     match goal {
         // What needs no more memory than there is stays as it is; where it cannot be had at all, the search says why.
-        Goal::Ram(_) => match usual(options.storage) {
+        Goal::Ram(_) => match usual(options.storage, options.texels) {
             Ok(baked) if usual::reaches(goal, options.limits(), &baked) => Ok(baked),
             Ok(Baked { settings, report, psnr_before: psnr, .. }) => {
                 once(tracer, options, Some(Whole { settings, memory: report.memory.workspace, psnr }), progress)
@@ -90,9 +93,9 @@ fn toward(tracer: &Tracer<'_>, options: &Options, progress: Progress<'_>) -> Res
         },
         Goal::Budget(_) | Goal::Psnr(_) => {
             let found = once(tracer, options, None, progress);
-            usual::or_found((goal, options.limits(), options.source().storage), &Seen::new(tracer, None), found, |storage| {
-                usual(Some(storage))
-            })
+            let asked = options.source();
+            let asked = (goal, options.limits(), (asked.storage, asked.texels));
+            usual::or_found(asked, &Seen::new(tracer, None), found, |(storage, texels)| usual(Some(storage), Some(texels)))
         }
     }
 }
@@ -125,6 +128,13 @@ fn once(tracer: &Tracer<'_>, options: &Options, whole: Option<Whole>, progress: 
     let repainted = painter.as_ref().map_or(Ok(false), |painter| painter.repaint(&mut made, &mut flat.atlas, options.goal))?;
     let (paint_seconds, verify_start) = (paint_seconds + paint_start.elapsed().as_secs_f64(), Instant::now());
     let Made { settings, encoded, .. } = made;
+    let halves = match &painter {
+        Some(painter) if tells_halves(options) => {
+            let (image, weighed) = (&flat.atlas.image, !chart::brings_own(scene));
+            halves::tried(&encoded.bundle, image, &settings.atlas, weighed, (painter, &seen))?
+        }
+        _ => None,
+    };
     progress("comparing with exact rays", 0.0);
     let quality = verify::against_exact(&encoded.bundle, &flat.atlas, &|d, n| progress("comparing with exact rays", part(d, n)))?;
     let inspection = Inspection::of(&encoded.bundle).map_err(verify::VerifyError::from)?;
@@ -140,10 +150,16 @@ fn once(tracer: &Tracer<'_>, options: &Options, whole: Option<Whole>, progress: 
         verify: verify_start.elapsed().as_secs_f64(),
         search: search_seconds,
     };
-    let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings, spaces, bends, why, outlines, repainted };
+    let origin = Origin { scene, flat: &flat, encoded: &encoded, settings: &settings, spaces, bends, why, outlines, halves, repainted };
     let mut report = Report::new(&origin, &inspection, quality, truth, work, seconds);
     report.warnings.extend(warnings);
     Ok(Baked { bundle: encoded.bundle, report, flat, settings, psnr_before, contested })
+}
+
+/// Whether the report has to say what texels of half a byte would come to: where it is open what they are, and no search has to tell.
+fn tells_halves(options: &Options) -> bool {
+    let open = options.texels.is_none() && options.source().texels == TexelKind::Indexed8;
+    open && options.goal.is_none() && !options.quick && options.truth != TruthFrames::None
 }
 
 /// What is known of the surface that a bundle was made of, where the settings alone made it.

@@ -26,6 +26,7 @@ mod finer;
 pub mod fit;
 pub mod folds;
 pub mod gbuffer;
+pub mod halves;
 pub mod inspect;
 pub mod job;
 mod joins;

@@ -3,7 +3,7 @@
 use crate::atlas::{self, Storage};
 use crate::bake::{Settings, Sparing};
 use crate::chart::Choice;
-use cubist_core::format::SPACE_CUBIC;
+use cubist_core::format::{SPACE_CUBIC, TexelKind};
 
 /// Screens wider than this get cells of 16 pixels unless told otherwise,
 const WIDE: u32 = 640;
@@ -69,6 +69,8 @@ pub struct Options {
     pub source: atlas::Settings,
     /// What its detail is worth, in place of `source.detail`; `None`: as that says, but a search for a budget may keep all of it.
     pub detail: Option<f64>,
+    /// What a texel is, in place of `source.texels`; `None`: as that says, but a search for a budget may take half a byte instead of a whole one.
+    pub texels: Option<TexelKind>,
     /// How the bundle holds it, in place of `source.storage`; `None`: as that says, but a search for a budget may pack it.
     pub storage: Option<Storage>,
     /// How the surface is cut and flattened, in place of `source.charts`; `None`: the baker tries.
@@ -105,6 +107,7 @@ impl Default for Options {
             even_keys: false,
             source: atlas::Settings::default(),
             detail: None,
+            texels: None,
             storage: None,
             charts: None,
             rewarp: None,
@@ -159,6 +162,7 @@ impl Options {
     pub fn source(&self) -> atlas::Settings {
         atlas::Settings {
             detail: self.detail.unwrap_or(self.source.detail),
+            texels: self.texels.unwrap_or(self.source.texels),
             storage: self.storage.unwrap_or(self.source.storage),
             charts: self.charts.unwrap_or(self.source.charts),
             ..self.source

@@ -124,19 +124,20 @@ impl Painter {
         settings: &atlas::Settings,
     ) -> Result<Option<(Vec<u8>, SourceImage)>, VerifyError> {
         let shown = self.shown(bundle, image)?;
-        let [left, top, right, bottom] = image.labels.first().map_or([0; 4], |background| background.rect.map(u32::from));
-        let fixed = |texel: u32| (left..right).contains(&(texel % image.width)) && (top..bottom).contains(&(texel / image.width));
-        let before: Vec<[u8; 3]> = image.texels.iter().map(|&texel| image.colour(texel)).collect();
-        let best = |((texel, &colour), shown): ((u32, &[u8; 3]), &Shown)| if fixed(texel) { colour } else { shown.best(colour) };
-        let wanted: Vec<[u8; 3]> = (0..).zip(&before).zip(&shown).map(best).collect();
-        let seen: Vec<u32> = shown.iter().map(|shown| shown.pixels as u32).collect();
-        let (texels, palette) = atlas::reduced(&wanted, &seen, settings);
-        let painted = SourceImage { texels: texels.into(), palette, ..image.clone() };
-        let after = error(&shown, painted.texels.iter().map(|&texel| painted.colour(texel)));
-        if after >= error(&shown, before.into_iter()) {
+        let painted = by_what_is(&shown, image, settings);
+        let [before, after] = [image, &painted].map(|image| error(&shown, image.texels.iter().map(|&texel| image.colour(texel))));
+        if after >= before {
             return Ok(None);
         }
         Ok(encode::with_image(bundle, &painted, settings.storage).map(|bundle| (bundle, painted)))
+    }
+
+    /// `bundle` with such colours whether they suit better or not, of the texels that `settings` ask for.
+    ///
+    /// # Errors
+    /// [`VerifyError`] where the player refuses the bytes.
+    pub(crate) fn coloured(&self, bundle: &[u8], image: &SourceImage, settings: &atlas::Settings) -> Result<Option<Vec<u8>>, VerifyError> {
+        Ok(encode::with_image(bundle, &by_what_is(&self.shown(bundle, image)?, image, settings), settings.storage))
     }
 
     /// What the scene has in the pixels that show each texel of `image`. Sums of whole numbers: the same on any number of threads.
@@ -163,6 +164,18 @@ impl Painter {
         };
         self.frames.par_chunks(RUN).zip(self.pictures.par_chunks(RUN)).map(of).try_reduce(none, add)
     }
+}
+
+/// `image` in the colours that suit what is `shown` of each texel, as `settings` have texels. The background keeps its own.
+fn by_what_is(shown: &[Shown], image: &SourceImage, settings: &atlas::Settings) -> SourceImage {
+    let [left, top, right, bottom] = image.labels.first().map_or([0; 4], |background| background.rect.map(u32::from));
+    let fixed = |texel: u32| (left..right).contains(&(texel % image.width)) && (top..bottom).contains(&(texel / image.width));
+    let before = image.texels.iter().map(|&texel| image.colour(texel));
+    let best = |((texel, colour), shown): ((u32, [u8; 3]), &Shown)| if fixed(texel) { colour } else { shown.best(colour) };
+    let wanted: Vec<[u8; 3]> = (0..).zip(before).zip(shown).map(best).collect();
+    let seen: Vec<u32> = shown.iter().map(|shown| shown.pixels as u32).collect();
+    let (texels, palette) = atlas::reduced(&wanted, &seen, settings);
+    SourceImage { kind: settings.texels, texels: texels.into(), palette, ..image.clone() }
 }
 
 #[cfg(test)]

@@ -9,7 +9,7 @@ use crate::climb::Free;
 use crate::options::{Goal, Options};
 use crate::repaint::Painter;
 use crate::scene::Scene;
-use cubist_core::format::{SPACE_LINEAR, TIME_LINEAR};
+use cubist_core::format::{SPACE_LINEAR, TIME_LINEAR, TexelKind};
 use std::time::Instant;
 
 /// Cells tried at first, pixels,
@@ -37,8 +37,8 @@ pub(crate) struct Chosen {
     pub search_seconds: f64,
     /// What the user should know about the choice.
     pub warnings: Vec<String>,
-    /// Whether the search leaves room for what is baked where nothing is asked for: how that has to be stored.
-    pub contested: Option<Storage>,
+    /// Whether the search leaves room for what is baked where nothing is asked for: how that has to be stored, and of which texels.
+    pub contested: Option<(Storage, TexelKind)>,
 }
 
 /// A bundle that needs more memory than there is.
@@ -99,7 +99,14 @@ impl Search<'_> {
     /// What `settings` make of `flat`, as the choice.
     pub(crate) fn finish(&self, flat: Flat, settings: Settings, warnings: Vec<String>) -> Result<Chosen, BakeError> {
         let encoded = self.encode(&flat, &settings)?;
-        Ok(Chosen { flat, encoded, settings, search_seconds: 0.0, warnings, contested: Some(settings.atlas.storage) })
+        Ok(Chosen {
+            flat,
+            encoded,
+            settings,
+            search_seconds: 0.0,
+            warnings,
+            contested: Some((settings.atlas.storage, settings.atlas.texels)),
+        })
     }
 
     /// The grids to try, the coarsest first.

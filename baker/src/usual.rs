@@ -7,18 +7,19 @@ use crate::baked::Baked;
 use crate::options::{Goal, Limits};
 use crate::seen::Seen;
 use crate::tune::MOST_MEMORY;
+use cubist_core::format::TexelKind;
 
 /// What a search for `goal` `found`, or the `usual` bundle, stored as it has to be, where that reaches the goal better: within a budget of bytes with more
 /// quality beside what is `seen`, or a quality with fewer bytes. Beyond `limits`, or in memory that searches would not take either, it is no answer.
-/// `asked`: how it is stored where nothing has to give.
+/// `asked`: how it is stored, and of which texels, where nothing has to give.
 ///
 /// # Errors
 /// What the search came to, where the usual bundle does not reach the goal either; those of the player.
 pub(crate) fn or_found(
-    (goal, limits, asked): (Goal, Limits, Storage),
+    (goal, limits, asked): (Goal, Limits, (Storage, TexelKind)),
     seen: &Seen<'_>,
     found: Result<Baked, BakeError>,
-    usual: impl FnOnce(Storage) -> Result<Baked, BakeError>,
+    usual: impl FnOnce((Storage, TexelKind)) -> Result<Baked, BakeError>,
 ) -> Result<Baked, BakeError> {
     let found = match found {
         // Whatever else is wrong is wrong with both.
@@ -27,8 +28,8 @@ pub(crate) fn or_found(
         }
         found => found?,
     };
-    let Some(storage) = found.contested else { return Ok(found) };
-    let Ok(usual) = usual(storage) else { return Ok(found) };
+    let Some(kept) = found.contested else { return Ok(found) };
+    let Ok(usual) = usual(kept) else { return Ok(found) };
     let most = limits.memory.unwrap_or(found.report.memory.workspace.max(MOST_MEMORY));
     let wins = reaches(goal, Limits { memory: Some(most), ..limits }, &usual) && better(goal, seen, &usual, &found)?;
     Ok(if wins { usual } else { found })

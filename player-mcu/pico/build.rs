@@ -19,5 +19,6 @@ fn main() -> std::io::Result<()> {
         let _written = writeln!(script, "    LONG({:#010x})", u32::from_le_bytes(*word));
     }
     std::fs::write(out.join("memory.x"), script + "  } > BOOT2\n} INSERT BEFORE .text;\n")?;
-    bundle::copy(&out)
+    bundle::copy(&out)?;
+    Ok(())
 }

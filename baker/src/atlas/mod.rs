@@ -311,7 +311,7 @@ pub(crate) fn reduced(colours: &[[u8; 3]], seen: &[u32], settings: &Settings) ->
 }
 
 /// Bytes of a raw texel, its bit of the mask counted in.
-fn texel_bytes(kind: TexelKind) -> f64 {
+pub(crate) fn texel_bytes(kind: TexelKind) -> f64 {
     (kind.bytes(8) + 1) as f64 / 8.0
 }
 

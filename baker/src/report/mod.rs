@@ -9,6 +9,7 @@ use crate::atlas::Storage;
 use crate::bends::Bends;
 use crate::causes::Causes;
 use crate::chart::{Family, Trial};
+use crate::halves;
 use crate::inspect::{Inspection, space_name, time_name};
 use crate::outlines;
 use crate::straight;
@@ -183,6 +184,9 @@ pub struct Source {
     /// Outlines that were tried; empty where none were.
     #[serde(default)]
     pub outlines: Vec<outlines::Trial>,
+    /// What the bundle would come to with texels of half a byte; none where that was not tried, or takes no fewer bytes.
+    #[serde(default)]
+    pub halves: Option<halves::Trial>,
 }
 
 impl Source {
@@ -210,6 +214,7 @@ impl Source {
             gutter: figures.gutter,
             outline: image.outline.bits_a_texel(),
             outlines: origin.outlines.clone(),
+            halves: origin.halves,
         }
     }
 }

@@ -3,6 +3,7 @@
 
 use crate::bake::{Encoded, Flat, Settings};
 use crate::bends::Bends;
+use crate::halves;
 use crate::outlines;
 use crate::scene::Scene;
 use crate::straight;
@@ -21,6 +22,8 @@ pub(crate) struct Origin<'a> {
     pub why: Option<String>,
     /// Outlines that were tried.
     pub outlines: Vec<outlines::Trial>,
+    /// What texels of half a byte would come to, where that was tried.
+    pub halves: Option<halves::Trial>,
     /// Texels were coloured by the pixels that show them.
     pub repainted: bool,
 }

@@ -3,7 +3,7 @@
 use super::{Grid, Report, Source};
 use crate::atlas::Storage;
 use crate::terminal::grouped;
-use crate::{bends, chart, outlines, straight};
+use crate::{bends, chart, halves, outlines, straight};
 use cubist_core::format::TexelKind;
 
 /// Rows of name and value. One without a name goes on with what the row above it is about.
@@ -56,6 +56,9 @@ fn tell_scene(report: &Report, rows: &mut Rows) {
 fn tell_bytes(report: &Report, rows: &mut Rows) {
     let Report { bytes, source_image: image, .. } = report;
     rows.add("source image", format!("{} bytes: {}", grouped(bytes.atlas), picture(image)));
+    if let Some(trial) = image.halves {
+        rows.add("", halves::reason(trial));
+    }
     rows.add("labels, mask", format!("{} bytes: {} labels for {} charts", grouped(bytes.labels + bytes.mask), image.labels, image.charts));
     if !image.outlines.is_empty() {
         rows.add("", outlines::reason(&image.outlines));

@@ -18,11 +18,15 @@ use cortex_m_semihosting::debug::{self, EXIT_FAILURE};
 use cubist_core::{Bundle, Frame, Player, Work};
 use text::Line;
 
-/// What the firmware plays.
-#[cfg(not(feature = "spread"))]
+/// What the firmware plays: what the bundle has.
+#[cfg(not(any(feature = "spread", texels = "4", texels = "565")))]
 type Texels = cubist_core::Indexed8;
 #[cfg(feature = "spread")]
 type Texels = cubist_core::Spread8;
+#[cfg(all(texels = "4", not(feature = "spread")))]
+type Texels = cubist_core::Indexed4;
+#[cfg(all(texels = "565", not(feature = "spread")))]
+type Texels = cubist_core::Direct565;
 
 /// Room for a player's working memory; what is not asked for stays untouched.
 const ROOM: usize = 1 << 20;

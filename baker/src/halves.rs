@@ -1,0 +1,76 @@
+//! Texels of half a byte: what a finished bundle would come to with them, for the report. `job` hands in the bundle; nothing changes but its source image.
+
+use crate::atlas::{self, SourceImage};
+use crate::bake::BakeError;
+use crate::repaint::Painter;
+use crate::seen::Seen;
+use crate::terminal::grouped;
+use cubist_core::format::TexelKind;
+use serde::{Deserialize, Serialize};
+
+/// A bundle with texels of half a byte, as many as there were whole ones.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Trial {
+    /// Its bytes.
+    pub bytes: usize,
+    /// Mean PSNR against the antialiased scene, dB.
+    pub psnr: f64,
+    /// What detail is to be worth for as many texels, since they take fewer bytes; none where it makes no difference.
+    pub detail: Option<f64>,
+}
+
+/// What `bundle` and its source `image`, which `settings` made, come to in the 16 colours that suit best what is played; `None` where that takes no
+/// fewer bytes. `weighed`: detail was weighed against bytes.
+///
+/// # Errors
+/// Those of the player.
+pub(crate) fn tried(
+    bundle: &[u8],
+    image: &SourceImage,
+    settings: &atlas::Settings,
+    weighed: bool,
+    (painter, seen): (&Painter, &Seen<'_>),
+) -> Result<Option<Trial>, BakeError> {
+    let texels = TexelKind::Indexed4;
+    let halved = painter.coloured(bundle, image, &atlas::Settings { texels, ..*settings })?.filter(|halved| halved.len() < bundle.len());
+    let detail = settings.detail * atlas::texel_bytes(texels) / atlas::texel_bytes(settings.texels);
+    let detail = Some(detail).filter(|detail| weighed && detail.is_finite());
+    halved.map(|halved| Ok(Trial { bytes: halved.len(), psnr: seen.psnr(&halved)?, detail })).transpose()
+}
+
+/// The same in a line.
+#[must_use]
+pub fn reason(trial: Trial) -> String {
+    let detail = trial.detail.map(|detail| format!(" --detail {detail:.3}")).unwrap_or_default();
+    format!(
+        "half a byte a texel: {} B, {:.2} dB against truth, or about that, by --texels 4{detail}; a device draws them slower",
+        grouped(trial.bytes),
+        trial.psnr
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::job::bake_scene;
+    use crate::options::Options;
+    use crate::tune::tests::small;
+    use cubist_core::format::TexelKind;
+
+    #[test]
+    fn a_report_tells_of_half_a_byte() {
+        let scene = small("street");
+        let report = |options| bake_scene(&scene, &options, &|_, _| {}).unwrap().1;
+        let usual = report(Options::default());
+        let told = usual.source_image.halves.unwrap();
+        // The scene brings its charts: there are as many texels either way.
+        let halved = report(Options { texels: Some(TexelKind::Indexed4), ..Options::default() });
+        let (bytes, psnr) = (halved.bytes.bundle, halved.quality_vs_truth.unwrap().psnr_mean);
+        assert!(told.bytes < usual.bytes.bundle * 3 / 4 && told.bytes.abs_diff(bytes) < bytes / 20, "{told:?} {bytes}");
+        // Here few pixels show a texel, so that the colour it had before counts.
+        assert!((told.psnr - psnr).abs() < 1.0, "{told:?} {psnr}");
+        assert_eq!(told.detail, None);
+        // Where it is said what texels are, or nothing is to be tried, nothing is told.
+        assert_eq!(halved.source_image.halves, None);
+        assert_eq!(report(Options::default().quick()).source_image.halves, None);
+    }
+}
