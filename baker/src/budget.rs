@@ -78,6 +78,9 @@ struct Images {
     usual: Vec<(TexelKind, usize, Option<usize>)>,
 }
 
+/// What a climb starts from, and its score.
+type Start = (Settings, f64);
+
 /// A way to code keys, measured at one source image.
 #[derive(Clone, Copy)]
 struct Keys {
@@ -201,7 +204,7 @@ impl Search<'_> {
         let mut current: Option<(Fineness, Flat)> = None;
         let mut exceeded = None;
         // Of each kind of texels the best.
-        let mut starts: Vec<(Settings, f64)> = Vec::new();
+        let mut starts: Vec<Start> = Vec::new();
         let (limits, mut nearest) = (self.options.limits(), (u64::MAX, 0, 0));
         let (mut fitting, mut room) = (Vec::new(), MOST_MEMORY);
         // Of bundles that fit the better one counts, of those that do not the smaller one: from there steps may lead to one that does.
@@ -269,19 +272,14 @@ impl Search<'_> {
 
     /// The better one of `starts`, and its source image, which `current` may be: of those that fit by their painted colours, since 16 colours leave
     /// painting less to gain.
-    fn better(
-        &self,
-        starts: &[(Settings, f64)],
-        current: Option<(Fineness, Flat)>,
-        samples: &Samples,
-    ) -> Result<Option<((Settings, f64), Flat)>, BakeError> {
+    fn better(&self, starts: &[Start], current: Option<(Fineness, Flat)>, samples: &Samples) -> Result<Option<(Start, Flat)>, BakeError> {
         let flat = |settings: &Settings| {
             // Laid out as the one that was tried, however it is stored.
             self.flat(atlas::Settings { storage: self.options.source().storage, ..settings.atlas })
         };
         if starts.len() > 1 && starts.iter().all(|&(_, found)| found > 0.0) {
             drop(current);
-            let mut best: Option<(f64, (Settings, f64), Flat)> = None;
+            let mut best: Option<(f64, Start, Flat)> = None;
             for &(settings, found) in starts {
                 let flat = flat(&settings)?;
                 let psnr = self.painted(&flat, &settings, samples)? - self.price(settings.atlas.texels);

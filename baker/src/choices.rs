@@ -38,8 +38,9 @@ pub enum Texels {
     /// A byte: one of 256 colours. Loses next to no quality, and draws fastest.
     #[value(name = "8")]
     Eight,
-    /// Half a byte: one of 16 colours. Real scenes lost up to 0.2 dB against the antialiased scene; smooth gradients show bands. A pixel takes
-    /// about five instructions more.
+    /// Half a byte: one of 16 colours. Of as many texels (--detail 0.017) real scenes took 16 to 42 % fewer bytes, for 0 to 0.4 dB against the
+    /// antialiased scene, those of many colours for up to 1; the report says what the scene's own would come to. Smooth gradients show bands. A pixel
+    /// takes 4.6 instructions more on a Cortex-M4, 8 on a Cortex-M0+.
     #[value(name = "4")]
     Four,
     /// Two bytes: any colour of the display, no palette. Gradients of more than 256 colours show no bands; no real scene measured gained in dB. A
