@@ -112,11 +112,12 @@ impl Search<'_> {
         let base = self.options.settings(self.scene.playback.width);
         let own = keys.iter().find(|keys| (keys.settings.cell, keys.settings.key_interval) == (base.cell, base.key_interval));
         let fits = |image: usize| (image + own.map_or(0, |own| own.bytes / 2)) as u64 <= budget;
-        let contested = usual.into_iter().find(|&(kind, ..)| kind == chosen.settings.atlas.texels).and_then(|usual| match usual {
-            (kind, bytes, _) if fits(bytes) => Some((base.atlas.storage, kind)),
-            (kind, _, Some(packed)) if fits(packed) => Some((Storage::Packed, kind)),
-            _ => None,
-        });
+        // What was asked for before what the search took instead.
+        let chose = chosen.settings.atlas.texels;
+        let kinds = || usual.iter().filter(|&&(kind, ..)| kind == base.atlas.texels || kind == chose);
+        let whole = kinds().find_map(|&(kind, bytes, _)| fits(bytes).then_some((base.atlas.storage, kind)));
+        let packed = || kinds().find_map(|&(kind, _, packed)| packed.filter(|&packed| fits(packed)).map(|_| (Storage::Packed, kind)));
+        let contested = whole.or_else(packed);
         Ok(Chosen { contested, ..chosen })
     }
 
