@@ -14,7 +14,7 @@ use cubist_core::format::TexelKind;
 
 /// What a bit is worth at first in the search for a budget.
 const BUDGET_LAMBDA: f32 = 0.1;
-/// Source images tried, at most.
+/// Source images tried, at most, of each kind of texels.
 const IMAGES: usize = 1 + DENSITIES.len();
 /// Bundles that fit the budget and are measured, of each kind of texels, before the best of them is bettered step by step.
 const TRIES: usize = 4;
@@ -104,8 +104,10 @@ impl Search<'_> {
         drop(reference);
         let mut pairs: Vec<(&Image, &Keys)> = images.iter().flat_map(|image| keys.iter().map(move |keys| (image, keys))).collect();
         pairs.sort_by(|a, b| {
+            // Kind by kind of texels, so that what is tried next is often of the same image.
+            let other = |(image, _): &(&Image, &Keys)| image.source.texels != self.options.source().texels;
             let error = |(image, keys): &(&Image, &Keys)| image.error + keys.error;
-            error(a).total_cmp(&error(b)).then(a.0.with(a.1, budget).0.cmp(&b.0.with(b.1, budget).0))
+            other(a).cmp(&other(b)).then(error(a).total_cmp(&error(b))).then(a.0.with(a.1, budget).0.cmp(&b.0.with(b.1, budget).0))
         });
         let chosen = self.best_pair(budget, &pairs, &samples, steps)?;
         // Half of what its keys take here may go as they are settled.
@@ -145,6 +147,10 @@ impl Search<'_> {
         let mut scale = 1.0;
         for (step, (texels, detail, ratio)) in self.kinds().into_iter().flat_map(each).enumerate() {
             self.say(step, steps);
+            // Where the finest one takes less than half of the room, half as many bytes would be of no use.
+            if texels != asked.texels && images.first().is_some_and(|finest| 2 * finest.bytes < room) {
+                continue;
+            }
             if ratio == 1.0 {
                 scale = 1.0;
             }
@@ -313,7 +319,7 @@ impl Search<'_> {
 pub(crate) fn halved(budget: u64) -> String {
     format!(
         "--budget {budget}: texels are half a byte, of 16 colours: a firmware's player of them is a Player<Indexed4> or Player<AnyTexels>; --texels 8 \
-         keeps whole bytes, at lower quality"
+         keeps whole bytes, at lower quality, if they fit"
     )
 }
 
@@ -400,7 +406,7 @@ mod tests {
         let (_, held) = bake(tight, Some(TexelKind::Indexed8));
         assert!(held.source_image.texels == TexelKind::Indexed8 && !told(&held));
         assert!(psnr(&open) > psnr(&held), "{} {}", psnr(&open), psnr(&held));
-        // Where there is room for whole ones, a little more is not worth a player of another kind.
+        // Where there is room, whole ones stay.
         let (_, wide) = bake(Some(Goal::Budget(plain.len() as u64 * 4)), None);
         assert!(wide.source_image.texels == TexelKind::Indexed8 && !told(&wide));
     }

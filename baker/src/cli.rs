@@ -550,6 +550,12 @@ mod tests {
         assert_eq!(texels(&["--texels", "4"]), (None, TexelKind::Indexed4, 16));
         assert_eq!(texels(&["--texels", "4", "--colours", "9"]), (None, TexelKind::Indexed4, 9));
         assert_eq!(texels(&["--texels", "565"]).1, TexelKind::Direct565);
+        // Given or not is another matter than which.
+        let given = |options: &[&str]| {
+            let bake = Cli::try_parse_from(["cubist-bake", "a.glb", "-o", "a.cubist"].iter().chain(options)).unwrap().bake;
+            bake.options(0.0).texels
+        };
+        assert_eq!((given(&[]), given(&["--texels", "8"])), (None, Some(TexelKind::Indexed8)));
         assert!(texels(&["--texels", "4", "--colours", "17"]).0.unwrap().contains("at most 16"));
         assert!(texels(&["--texels", "565", "--colours", "16"]).0.unwrap().contains("no palette"));
         assert!(Cli::try_parse_from(["cubist-bake", "inspect", "a.cubist", "--json"]).unwrap().command.is_some());

@@ -32,7 +32,7 @@ pub(crate) fn tried(
     (painter, seen): (&Painter, &Seen<'_>),
 ) -> Result<Option<Trial>, BakeError> {
     let texels = TexelKind::Indexed4;
-    let halved = painter.coloured(bundle, image, &atlas::Settings { texels, ..*settings })?.filter(|halved| halved.len() < bundle.len());
+    let halved = painter.recoloured(bundle, image, &atlas::Settings { texels, ..*settings })?.filter(|halved| halved.len() < bundle.len());
     let detail = settings.detail * atlas::texel_bytes(texels) / atlas::texel_bytes(settings.texels);
     let detail = Some(detail).filter(|detail| weighed && detail.is_finite());
     halved.map(|halved| Ok(Trial { bytes: halved.len(), psnr: seen.psnr(&halved)?, detail })).transpose()
@@ -41,7 +41,7 @@ pub(crate) fn tried(
 /// The same in a line.
 #[must_use]
 pub fn reason(trial: Trial) -> String {
-    let detail = trial.detail.map(|detail| format!(" --detail {detail:.3}")).unwrap_or_default();
+    let detail = trial.detail.map(|detail| format!(" --detail {detail:.4}")).unwrap_or_default();
     format!(
         "half a byte a texel: {} B, {:.2} dB against truth, or about that, by --texels 4{detail}; a device draws them slower",
         grouped(trial.bytes),
@@ -51,10 +51,11 @@ pub fn reason(trial: Trial) -> String {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
+    use crate::chart::Family;
     use crate::job::bake_scene;
     use crate::options::Options;
     use crate::tune::tests::small;
-    use cubist_core::format::TexelKind;
 
     #[test]
     fn a_report_tells_of_half_a_byte() {
@@ -69,8 +70,18 @@ mod tests {
         // Here few pixels show a texel, so that the colour it had before counts.
         assert!((told.psnr - psnr).abs() < 1.0, "{told:?} {psnr}");
         assert_eq!(told.detail, None);
-        // Where it is said what texels are, or nothing is to be tried, nothing is told.
+        // Where the baker cuts charts, as many texels take detail that is worth less: five ninths, with the mask.
+        let cut = report(Options { charts: Some(Family::Planes.into()), ..Options::default() });
+        let trial = cut.source_image.halves.unwrap();
+        assert_eq!(trial.detail, Some(0.03 * 5.0 / 9.0));
+        assert!(reason(trial).contains("--texels 4 --detail 0.0167"), "{}", reason(trial));
+        // Where it is said what texels are, or that there are more colours, or that nothing is to be tried or painted, nothing is told.
         assert_eq!(halved.source_image.halves, None);
-        assert_eq!(report(Options::default().quick()).source_image.halves, None);
+        let few = atlas::Settings { colours: 64, ..atlas::Settings::default() };
+        for options in
+            [Options::default().quick(), Options { plain: true, ..Options::default() }, Options { source: few, ..Options::default() }]
+        {
+            assert_eq!(report(options).source_image.halves, None);
+        }
     }
 }

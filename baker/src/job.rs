@@ -130,8 +130,9 @@ fn once(tracer: &Tracer<'_>, options: &Options, whole: Option<Whole>, progress: 
     let Made { settings, encoded, .. } = made;
     let halves = match &painter {
         Some(painter) if tells_halves(options) => {
-            let (image, weighed) = (&flat.atlas.image, !chart::brings_own(scene));
-            halves::tried(&encoded.bundle, image, &settings.atlas, weighed, (painter, &seen))?
+            progress("trying half a byte a texel", 0.0);
+            let (image, brought) = (&flat.atlas.image, settings.atlas.charts.family == Family::Own && chart::brings_own(scene));
+            halves::tried(&encoded.bundle, image, &settings.atlas, !brought, (painter, &seen))?
         }
         _ => None,
     };
@@ -158,7 +159,10 @@ fn once(tracer: &Tracer<'_>, options: &Options, whole: Option<Whole>, progress: 
 
 /// Whether the report has to say what texels of half a byte would come to: where it is open what they are, and no search has to tell.
 fn tells_halves(options: &Options) -> bool {
-    let open = options.texels.is_none() && options.source().texels == TexelKind::Indexed8;
+    let (source, half) = (options.source(), TexelKind::Indexed4.colours());
+    // More colours than that may be asked for, but not all of them.
+    let colours = source.colours <= half || source.colours >= TexelKind::Indexed8.colours();
+    let open = options.texels.is_none() && source.texels == TexelKind::Indexed8 && colours;
     open && options.goal.is_none() && !options.quick && options.truth != TruthFrames::None
 }
 

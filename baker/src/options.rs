@@ -185,6 +185,7 @@ impl Options {
         let all = [
             (cells && self.cell.is_some(), "--cell"),
             (self.key_interval.is_some(), "--key-interval"),
+            (matches!(self.goal, Some(Goal::Budget(_))) && self.texels == Some(TexelKind::Indexed8), "--texels"),
             (!cells && self.all_sheets, "--sheets"),
             (memory && self.time.is_some(), "--time"),
             (memory && self.space.is_some(), "--space"),

@@ -1,6 +1,6 @@
 //! Repainting: every texel in the colour that suits the pixels that show it.
-//! A finished bundle and its source image come from `job`, those that a search tries from `tune`; both go back with other colours, everything else as
-//! it was.
+//! A finished bundle and its source image come from `job`, those that are tried from searches, `seen` and `halves`; both go back with other colours,
+//! everything else as it was.
 //!
 //! A texel is coloured by what lies there, but pixels show it that see what lies around it too, and by positions that are interpolated. Where pixels show
 //! their nearest texel, the squared error of all of them is a sum over texels, and each one's part is least at the mean of what the scene has in its
@@ -124,7 +124,7 @@ impl Painter {
         settings: &atlas::Settings,
     ) -> Result<Option<(Vec<u8>, SourceImage)>, VerifyError> {
         let shown = self.shown(bundle, image)?;
-        let painted = by_what_is(&shown, image, settings);
+        let painted = suited(&shown, image, settings);
         let [before, after] = [image, &painted].map(|image| error(&shown, image.texels.iter().map(|&texel| image.colour(texel))));
         if after >= before {
             return Ok(None);
@@ -132,12 +132,17 @@ impl Painter {
         Ok(encode::with_image(bundle, &painted, settings.storage).map(|bundle| (bundle, painted)))
     }
 
-    /// `bundle` with such colours whether they suit better or not, of the texels that `settings` ask for.
+    /// `bundle` in colours that suit what it shows, with texels of the kind that `settings` ask for, whether that is better or not.
     ///
     /// # Errors
     /// [`VerifyError`] where the player refuses the bytes.
-    pub(crate) fn coloured(&self, bundle: &[u8], image: &SourceImage, settings: &atlas::Settings) -> Result<Option<Vec<u8>>, VerifyError> {
-        Ok(encode::with_image(bundle, &by_what_is(&self.shown(bundle, image)?, image, settings), settings.storage))
+    pub(crate) fn recoloured(
+        &self,
+        bundle: &[u8],
+        image: &SourceImage,
+        settings: &atlas::Settings,
+    ) -> Result<Option<Vec<u8>>, VerifyError> {
+        Ok(encode::with_image(bundle, &suited(&self.shown(bundle, image)?, image, settings), settings.storage))
     }
 
     /// What the scene has in the pixels that show each texel of `image`. Sums of whole numbers: the same on any number of threads.
@@ -166,8 +171,8 @@ impl Painter {
     }
 }
 
-/// `image` in the colours that suit what is `shown` of each texel, as `settings` have texels. The background keeps its own.
-fn by_what_is(shown: &[Shown], image: &SourceImage, settings: &atlas::Settings) -> SourceImage {
+/// `image` in the colours that suit what is `shown` of each texel, reduced to what texels of `settings` can have. The background is not repainted.
+fn suited(shown: &[Shown], image: &SourceImage, settings: &atlas::Settings) -> SourceImage {
     let [left, top, right, bottom] = image.labels.first().map_or([0; 4], |background| background.rect.map(u32::from));
     let fixed = |texel: u32| (left..right).contains(&(texel % image.width)) && (top..bottom).contains(&(texel / image.width));
     let before = image.texels.iter().map(|&texel| image.colour(texel));

@@ -1,5 +1,6 @@
 //! How good bundles look: their frames beside the antialiased scene, in the colours that their texels get in the end.
-//! The scene and a painter come from `job`. `finer` asks what closer keys or keys farther apart are worth, `usual` which of two bundles is better.
+//! The scene and a painter come from `job`. `finer` asks what closer keys or keys farther apart are worth, `usual` which of two bundles is better, `halves`
+//! how good one with texels of half a byte would be.
 //!
 //! Exact rays through the source image do not tell that: what outlines and texels lose against the scene, no keys bring back.
 

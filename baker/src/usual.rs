@@ -28,8 +28,8 @@ pub(crate) fn or_found(
         }
         found => found?,
     };
-    let Some(kept) = found.contested else { return Ok(found) };
-    let Ok(usual) = usual(kept) else { return Ok(found) };
+    let Some(stored) = found.contested else { return Ok(found) };
+    let Ok(usual) = usual(stored) else { return Ok(found) };
     let most = limits.memory.unwrap_or(found.report.memory.workspace.max(MOST_MEMORY));
     let wins = reaches(goal, Limits { memory: Some(most), ..limits }, &usual) && better(goal, seen, &usual, &found)?;
     Ok(if wins { usual } else { found })
