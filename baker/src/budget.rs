@@ -6,6 +6,7 @@ use crate::atlas::{self, Storage};
 use crate::bake::{BakeError, Encoded, Flat, Settings, Sparing};
 use crate::climb::{Free, Step, Take, climb};
 use crate::encode::{image_bytes, raw_bytes};
+use crate::repaint;
 use crate::samples::Samples;
 use crate::terminal::grouped;
 use crate::tune::{Chosen, DENSITIES, MOST_MEMORY, STEPS, Search, possible};
@@ -126,8 +127,7 @@ impl Search<'_> {
     /// The kinds of texels to try.
     fn kinds(&self) -> Vec<TexelKind> {
         let asked = self.options.source().texels;
-        let halves = self.options.texels.is_none() && asked == TexelKind::Indexed8;
-        if halves { vec![asked, TexelKind::Indexed4] } else { vec![asked] }
+        if self.options.may_halve() { vec![asked, TexelKind::Indexed4] } else { vec![asked] }
     }
 
     /// What texels of `kind` have to bring beside those asked for, dB.
@@ -141,45 +141,41 @@ impl Search<'_> {
         let asked = self.options.source();
         let (mut images, mut reference, mut usual): (Vec<Image>, _, _) = (Vec::new(), None, Vec::new());
         let all = self.options.detail.is_none().then_some((f64::INFINITY, 1.0));
-        let each = |texels| {
-            all.into_iter().chain(DENSITIES.map(|ratio| (asked.detail, ratio))).map(move |(detail, ratio)| (texels, detail, ratio))
-        };
-        let mut scale = 1.0;
-        for (step, (texels, detail, ratio)) in self.kinds().into_iter().flat_map(each).enumerate() {
-            self.say(step, steps);
+        for (number, texels) in self.kinds().into_iter().enumerate() {
             // Where the finest one takes less than half of the room, half as many bytes would be of no use.
-            if texels != asked.texels && images.first().is_some_and(|finest| 2 * finest.bytes < room) {
-                continue;
+            if images.first().is_some_and(|finest| number > 0 && 2 * finest.bytes < room) {
+                break;
             }
-            if ratio == 1.0 {
-                scale = 1.0;
-            }
-            let source = atlas::Settings { density: asked.density * scale * ratio, detail, texels, ..asked };
-            let coarsest = ratio == DENSITIES[DENSITIES.len() - 1];
-            let finer = |last: &Image| source.density / last.source.density;
-            if let Some(last) = images.last()
-                && (last.source.detail, last.source.texels) == (detail, texels)
-                && !coarsest
-                && last.least() as f64 * finer(last) * finer(last) > 1.5 * room as f64
-            {
-                continue;
-            }
-            let flat = self.flat(source)?;
-            let packed = self.options.storage.is_none().then(|| image_bytes(&flat.atlas.image, Storage::Packed));
-            let bytes = image_bytes(&flat.atlas.image, source.storage);
-            if detail == asked.detail && ratio == 1.0 {
-                // Where the image is full, densities above what it holds change nothing.
-                scale = flat.atlas.figures.scale.min(1.0);
-                usual.push((texels, bytes, packed));
-            }
-            let unpacked = raw_bytes(&flat.atlas.image);
-            let image = Image { source, bytes, packed, unpacked, error: samples.of_image(&flat.atlas) };
-            if reference.is_none() && (image.least() < room / 10 * 9 || coarsest) {
-                reference = Some(flat);
-            }
-            // A flattening of the scene's own has all its detail as it is.
-            if !images.last().is_some_and(|last| (last.bytes, last.error) == (image.bytes, image.error)) {
-                images.push(image);
+            let mut scale = 1.0;
+            for (step, (detail, ratio)) in all.into_iter().chain(DENSITIES.map(|ratio| (asked.detail, ratio))).enumerate() {
+                self.say(number * IMAGES + step, steps);
+                let source = atlas::Settings { density: asked.density * scale * ratio, detail, texels, ..asked };
+                let coarsest = ratio == DENSITIES[DENSITIES.len() - 1];
+                let finer = |last: &Image| source.density / last.source.density;
+                if let Some(last) = images.last()
+                    && (last.source.detail, last.source.texels) == (detail, texels)
+                    && !coarsest
+                    && last.least() as f64 * finer(last) * finer(last) > 1.5 * room as f64
+                {
+                    continue;
+                }
+                let flat = self.flat(source)?;
+                let packed = self.options.storage.is_none().then(|| image_bytes(&flat.atlas.image, Storage::Packed));
+                let bytes = image_bytes(&flat.atlas.image, source.storage);
+                if detail == asked.detail && ratio == 1.0 {
+                    // Where the image is full, densities above what it holds change nothing.
+                    scale = flat.atlas.figures.scale.min(1.0);
+                    usual.push((texels, bytes, packed));
+                }
+                let unpacked = raw_bytes(&flat.atlas.image);
+                let image = Image { source, bytes, packed, unpacked, error: samples.of_image(&flat.atlas) };
+                if reference.is_none() && (image.least() < room / 10 * 9 || coarsest) {
+                    reference = Some(flat);
+                }
+                // A flattening of the scene's own has all its detail as it is.
+                if !images.last().is_some_and(|last| (last.bytes, last.error) == (image.bytes, image.error)) {
+                    images.push(image);
+                }
             }
         }
         let reference = reference.ok_or(BakeError::Budget { budget, smallest: u64::MAX })?;
@@ -240,10 +236,7 @@ impl Search<'_> {
                 continue;
             }
             self.say(steps - STEPS - self.kinds().len() * TRIES + fitting.len(), steps);
-            let flat = match current.take() {
-                Some((fine, flat)) if fine == fineness(&image.source) => flat,
-                _ => self.flat(image.source)?,
-            };
+            let flat = self.at_hand(&mut current, &image.source)?;
             let error = self.prunes(keys.error);
             let settings = Settings { atlas: source, sparing: Sparing::Within(budget), error, ..keys.settings };
             let found = score(&flat, &settings, true)?;
@@ -279,39 +272,43 @@ impl Search<'_> {
 
     /// The better one of `starts`, and its source image, which `current` may be: of those that fit by their painted colours, since 16 colours leave
     /// painting less to gain.
-    fn better(&self, starts: &[Start], current: Option<(Fineness, Flat)>, samples: &Samples) -> Result<Option<(Start, Flat)>, BakeError> {
-        let flat = |settings: &Settings| {
-            // Laid out as the one that was tried, however it is stored.
-            self.flat(atlas::Settings { storage: self.options.source().storage, ..settings.atlas })
-        };
-        if starts.len() > 1 && starts.iter().all(|&(_, found)| found > 0.0) {
-            drop(current);
-            let mut best: Option<(f64, Start, Flat)> = None;
-            for &(settings, found) in starts {
-                let flat = flat(&settings)?;
-                let psnr = self.painted(&flat, &settings, samples)? - self.price(settings.atlas.texels);
-                if best.as_ref().is_none_or(|&(most, ..)| psnr > most) {
-                    best = Some((psnr, (settings, found), flat));
-                }
+    fn better(
+        &self,
+        starts: &[Start],
+        mut current: Option<(Fineness, Flat)>,
+        samples: &Samples,
+    ) -> Result<Option<(Start, Flat)>, BakeError> {
+        let fit = starts.iter().all(|&(_, found)| found > 0.0);
+        let best = starts.iter().max_by(|a, b| a.1.total_cmp(&b.1)).map_or(&[][..], std::slice::from_ref);
+        let starts = if fit { starts } else { best };
+        let mut better: Option<(f64, Start, Flat)> = None;
+        for &(settings, found) in starts {
+            let flat = self.at_hand(&mut current, &settings.atlas)?;
+            // One alone is the best as it is.
+            let psnr = if starts.len() == 1 { found } else { self.painted(&flat, &settings, samples)? - self.price(settings.atlas.texels) };
+            if better.as_ref().is_none_or(|&(most, ..)| psnr > most) {
+                better = Some((psnr, (settings, found), flat));
             }
-            return Ok(best.map(|(_, start, flat)| (start, flat)));
         }
-        let Some(&start) = starts.iter().max_by(|a, b| a.1.total_cmp(&b.1)) else { return Ok(None) };
-        let flat = match current {
-            Some((fine, flat)) if fine == fineness(&start.0.atlas) => flat,
-            _ => flat(&start.0)?,
-        };
-        Ok(Some((start, flat)))
+        Ok(better.map(|(_, start, flat)| (start, flat)))
+    }
+
+    /// The source image of `source`, laid out as asked for, however it is stored: `current`, if that is it.
+    fn at_hand(&self, current: &mut Option<(Fineness, Flat)>, source: &atlas::Settings) -> Result<Flat, BakeError> {
+        match current.take() {
+            Some((fine, flat)) if fine == fineness(source) => Ok(flat),
+            // Large: gone before another one is made.
+            other => {
+                drop(other);
+                self.flat(atlas::Settings { storage: self.options.source().storage, ..*source })
+            }
+        }
     }
 
     /// The mean PSNR against the truth of what `settings` make of `flat`, dB, in the colours that it gets in the end.
     fn painted(&self, flat: &Flat, settings: &Settings, samples: &Samples) -> Result<f64, BakeError> {
         let Encoded { bundle, .. } = self.encode(flat, settings)?;
-        let painted = match self.painter {
-            Some(painter) => painter.painted(&bundle, &flat.atlas.image, &settings.atlas)?,
-            None => None,
-        };
-        Ok(samples.of_bundle(painted.as_ref().map_or(&bundle, |(painted, _)| painted))?.1)
+        Ok(samples.of_bundle(&repaint::finished(self.painter, &bundle, &flat.atlas.image, &settings.atlas)?)?.1)
     }
 }
 

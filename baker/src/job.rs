@@ -126,7 +126,7 @@ fn once(tracer: &Tracer<'_>, options: &Options, whole: Option<Whole>, progress: 
     let psnr_before = made.quality.psnr_mean;
     let (search_seconds, paint_start) = (search_seconds + better_start.elapsed().as_secs_f64(), Instant::now());
     let repainted = painter.as_ref().map_or(Ok(false), |painter| painter.repaint(&mut made, &mut flat.atlas, options.goal))?;
-    let (paint_seconds, verify_start) = (paint_seconds + paint_start.elapsed().as_secs_f64(), Instant::now());
+    let (paint_seconds, halves_start) = (paint_seconds + paint_start.elapsed().as_secs_f64(), Instant::now());
     let Made { settings, encoded, .. } = made;
     let halves = match &painter {
         Some(painter) if tells_halves(options) => {
@@ -136,6 +136,7 @@ fn once(tracer: &Tracer<'_>, options: &Options, whole: Option<Whole>, progress: 
         }
         _ => None,
     };
+    let (search_seconds, verify_start) = (search_seconds + halves_start.elapsed().as_secs_f64(), Instant::now());
     progress("comparing with exact rays", 0.0);
     let quality = verify::against_exact(&encoded.bundle, &flat.atlas, &|d, n| progress("comparing with exact rays", part(d, n)))?;
     let inspection = Inspection::of(&encoded.bundle).map_err(verify::VerifyError::from)?;
@@ -159,10 +160,9 @@ fn once(tracer: &Tracer<'_>, options: &Options, whole: Option<Whole>, progress: 
 
 /// Whether the report has to say what texels of half a byte would come to: where it is open what they are, and no search has to tell.
 fn tells_halves(options: &Options) -> bool {
-    let (source, half) = (options.source(), TexelKind::Indexed4.colours());
+    let (colours, half) = (options.source().colours, TexelKind::Indexed4.colours());
     // More colours than that may be asked for, but not all of them.
-    let colours = source.colours <= half || source.colours >= TexelKind::Indexed8.colours();
-    let open = options.texels.is_none() && source.texels == TexelKind::Indexed8 && colours;
+    let open = options.may_halve() && (colours <= half || colours >= TexelKind::Indexed8.colours());
     open && options.goal.is_none() && !options.quick && options.truth != TruthFrames::None
 }
 

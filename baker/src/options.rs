@@ -169,6 +169,11 @@ impl Options {
         }
     }
 
+    /// Whether texels may be half a byte: where they are whole ones, and nobody said that they have to be.
+    pub(crate) fn may_halve(&self) -> bool {
+        self.texels.is_none() && self.source().texels == TexelKind::Indexed8
+    }
+
     /// What the bundle has to keep within.
     pub(crate) fn limits(&self) -> Limits {
         match self.goal {

@@ -17,6 +17,7 @@ use crate::shade::Shader;
 use crate::truth::spread;
 use crate::verify::{self, VerifyError};
 use rayon::prelude::*;
+use std::borrow::Cow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Frames looked at, evenly spread.
@@ -169,6 +170,20 @@ impl Painter {
         };
         self.frames.par_chunks(RUN).zip(self.pictures.par_chunks(RUN)).map(of).try_reduce(none, add)
     }
+}
+
+/// `bundle` in the colours that it gets in the end by `painter`: its own where there is none, or none that suit better.
+///
+/// # Errors
+/// [`VerifyError`] where the player refuses the bytes.
+pub(crate) fn finished<'b>(
+    painter: Option<&Painter>,
+    bundle: &'b [u8],
+    image: &SourceImage,
+    settings: &atlas::Settings,
+) -> Result<Cow<'b, [u8]>, VerifyError> {
+    let painted = painter.map_or(Ok(None), |painter| painter.painted(bundle, image, settings))?;
+    Ok(painted.map_or(Cow::Borrowed(bundle), |(painted, _)| Cow::Owned(painted)))
 }
 
 /// `image` in the colours that suit what is `shown` of each texel, reduced to what texels of `settings` can have. The background is not repainted.

@@ -7,7 +7,7 @@
 use crate::bake::{BakeError, Flat};
 use crate::made::Made;
 use crate::metrics;
-use crate::repaint::Painter;
+use crate::repaint::{self, Painter};
 use crate::trace::Tracer;
 use crate::truth::Truth;
 use crate::verify;
@@ -38,11 +38,7 @@ impl<'a> Seen<'a> {
     /// Those of the player.
     pub fn worth(&self, made: &Made, flat: &Flat, picture: usize) -> Result<f64, BakeError> {
         let bundle = &made.encoded.bundle;
-        let painted = match self.painter {
-            Some(painter) => painter.painted(bundle, &flat.atlas.image, &made.settings.atlas)?,
-            None => None,
-        };
-        let psnr = self.psnr(painted.as_ref().map_or(bundle, |(painted, _)| painted))?;
+        let psnr = self.psnr(&repaint::finished(self.painter, bundle, &flat.atlas.image, &made.settings.atlas)?)?;
         Ok(metrics::worth(psnr, bundle.len().saturating_sub(picture) as u64, DOUBLE))
     }
 
